@@ -1,6 +1,6 @@
 """What does the motion of a long shaft cost with each model, and how exact is it?
 
-Run `python benchmarks/shaft_models.py`. The shaft is the steel one of Popenda 2019 between 0.025 and 0.11 kg m2,
+Run `python -m benchmarks.shaft_models`. The shaft is the steel one of Popenda 2019 between 0.025 and 0.11 kg m2,
 without damping, under a step of 12.7 N m at the motor, 0.2 s. Its motion is compared with the exact one by
 characteristics: largest error of the torques and of the speeds at both ends, over the largest of each. CPU: process
 time of one warm public call on one thread, median, with 401 output times. Beside it stands what is usual: a chain of
@@ -27,8 +27,8 @@ from scipy.integrate import solve_ivp
 
 import shaftwork as sw
 from shaftwork.scenes.long_shafts import LOAD_INERTIA, MOTOR_INERTIA, RATED_TORQUE
-from shaftwork.studies.exact_shafts.exact_motion import JunctionTorque, motion
-from shaftwork.studies.exact_shafts.line import Section, SectionLine
+from tests.reference.exact_shafts.exact_motion import JunctionTorque, motion
+from tests.reference.exact_shafts.line import Section, SectionLine
 
 Array = NDArray[np.float64]
 

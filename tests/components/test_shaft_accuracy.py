@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import shaftwork as sw
-from shaftwork.studies.exact_shafts.line import Section, SectionLine
 from tests.components.test_shafts import INERTIA, STEEL, STIFFNESS, TRUE, train
+from tests.reference.exact_shafts.line import Section, SectionLine
 from tests.reference.line_modes import natural_frequencies
 
 

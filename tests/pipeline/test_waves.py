@@ -9,8 +9,8 @@ import pytest
 import sympy
 
 import shaftwork as sw
-from shaftwork.studies.exact_shafts.exact_motion import JunctionTorque, motion
-from shaftwork.studies.exact_shafts.line import Section, SectionLine
+from tests.reference.exact_shafts.exact_motion import JunctionTorque, motion
+from tests.reference.exact_shafts.line import Section, SectionLine
 
 STEEL = {"density": 7900.0, "shear_modulus": 77.5e9}
 SECTION = Section.of_geometry(1.0, 0.02, **STEEL)

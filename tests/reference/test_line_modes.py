@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.studies.exact_shafts.line import Array, End, Section, SectionLine
+from tests.reference.exact_shafts.line import Array, End, Section, SectionLine
 from tests.reference.line_modes import LineModes, modes, modes_below, natural_frequencies
 
 SHAFT = Section.of_geometry(1.0, 0.02)

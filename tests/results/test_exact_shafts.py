@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 import shaftwork as sw
 from shaftwork.frequency.exact_shafts import exact_spectrum
-from shaftwork.studies.exact_shafts.exact_response import frequency_response
-from shaftwork.studies.exact_shafts.line import Section, SectionLine
 from tests.properties.examples import share_of_examples
+from tests.reference.exact_shafts.exact_response import frequency_response
+from tests.reference.exact_shafts.line import Section, SectionLine
 from tests.reference.line_modes import modes as line_modes
 from tests.reference.line_modes import natural_frequencies
 

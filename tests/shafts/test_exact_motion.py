@@ -10,9 +10,9 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import eigh_tridiagonal
 
 from shaftwork.core.errors import ParameterError, SimulationError
-from shaftwork.studies.exact_shafts.exact_motion import JunctionTorque, LineMotion, common_step, motion
-from shaftwork.studies.exact_shafts.exact_response import laplace_response
-from shaftwork.studies.exact_shafts.line import Array, End, Section, SectionLine
+from tests.reference.exact_shafts.exact_motion import JunctionTorque, LineMotion, common_step, motion
+from tests.reference.exact_shafts.exact_response import laplace_response
+from tests.reference.exact_shafts.line import Array, End, Section, SectionLine
 from tests.reference.line_modes import modes
 
 SHAFT = Section.of_geometry(1.0, 0.02)

@@ -8,8 +8,8 @@ import pytest
 from scipy.linalg import solve_banded
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.studies.exact_shafts.exact_response import Complex, Drive, frequency_response, laplace_response
-from shaftwork.studies.exact_shafts.line import Array, Section, SectionLine
+from tests.reference.exact_shafts.exact_response import Complex, Drive, frequency_response, laplace_response
+from tests.reference.exact_shafts.line import Array, Section, SectionLine
 from tests.reference.line_modes import modes
 
 SHAFT = Section.of_geometry(1.0, 0.02)

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.studies.exact_shafts.line import Section, SectionLine
+from tests.reference.exact_shafts.line import Section, SectionLine
 
 SHAFT = Section.of_geometry(1.0, 0.02)
 

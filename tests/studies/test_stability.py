@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import sys
 from itertools import pairwise
 from pathlib import Path
 
@@ -15,7 +16,8 @@ import shaftwork as sw
 from docs.generate import extreme_drives
 from shaftwork.studies.stability import RIGHT, SAME, distances, judge, stability
 from shaftwork.studies.stability_cases import CASES, TORQUE, Case
-from shaftwork.studies.stability_truth import QUANTITIES, exact, predicted
+from shaftwork.studies.truth import ENDS, exact, predicted
+from tests.reference.extreme_drives import continuous
 
 NAMED = {case.name: case for case in CASES}
 MESHES = (sw.Lumped(10), sw.CentralDifference(10), sw.CentralDifference(10, order=4), sw.Spectral(8))
@@ -84,16 +86,16 @@ def test_waves_are_right_in_every_case_that_they_take(study: sw.studies.Stabilit
 def test_a_matched_end_returns_less_than_a_millionth_of_the_pulse() -> None:
     case = NAMED["matched end, pulse"]
     run = case.network(sw.Wave(3)).simulate(case.t_end, t_eval=case.times)
-    back = run.t > (case.rise + 0.01) * case.section.delay
+    back = run.t > (case.rise + 0.01) * case.delay
     assert np.abs(run["line.tau_b"]).max() == pytest.approx(TORQUE, rel=1e-12)
-    assert np.abs(run["line.omega_a"][back]).max() * case.section.impedance < 1e-6 * TORQUE
+    assert np.abs(run["line.omega_a"][back]).max() * case.impedance < 1e-6 * TORQUE
 
 
 def test_a_matched_end_returns_nothing_of_a_step() -> None:
     """The drive end sees the impedance alone, as if the shaft had no other end."""
     case = NAMED["matched end, step"]
     run = case.network(sw.Wave(3)).simulate(case.t_end, t_eval=case.times)
-    np.testing.assert_allclose(run["line.omega_a"] * case.section.impedance, TORQUE, rtol=1e-9)
+    np.testing.assert_allclose(run["line.omega_a"] * case.impedance, TORQUE, rtol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["m = 2", "inertia ratio 10000", "free end", "clamped end"])
@@ -115,8 +117,7 @@ def test_what_a_chain_must_do_is_what_newton_says_of_it() -> None:
     """Half cells, springs and a damper by hand, solved by another method."""
     case, m = dataclasses.replace(NAMED["matched end, step"], drive=2.0, load=0.5, damping=0.02), 5
     own = predicted(case, sw.Lumped(m))
-    section, inertia = case.section, case.inertia
-    c, d = section.stiffness / section.length * m, section.damping / section.length * m
+    inertia, c, d = case.inertia, case.stiffness * m, case.dashpot * m
     masses = np.full(m + 1, inertia / m)
     masses[[0, -1]] = inertia / m / 2 + np.array([2.0, 0.5]) * inertia
 
@@ -124,7 +125,7 @@ def test_what_a_chain_must_do_is_what_newton_says_of_it() -> None:
         speeds, torques = x[: m + 1], x[m + 1 :]
         twist = speeds[:-1] - speeds[1:]
         through = torques + d * twist
-        push = np.concatenate([[TORQUE], through]) - np.concatenate([through, [section.impedance * speeds[-1]]])
+        push = np.concatenate([[TORQUE], through]) - np.concatenate([through, [case.impedance * speeds[-1]]])
         return np.concatenate([push / masses, c * twist])
 
     found = solve_ivp(rates, (0, case.t_end), np.zeros(2 * m + 1), t_eval=case.times, rtol=1e-10, atol=1e-10)
@@ -133,11 +134,21 @@ def test_what_a_chain_must_do_is_what_newton_says_of_it() -> None:
     np.testing.assert_allclose(own.values["omega_b"], found.y[m], rtol=1e-7, atol=1e-6)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_the_truth_is_that_of_the_continuous_shaft(case: Case) -> None:
+    """By characteristics, or by the inverted two-port: computations without network, equations or engine."""
+    truth, reference = exact(case), continuous(case)
+    error, _, _ = distances(truth.values, reference, None)
+    assert error < 1e-6 + truth.error + reference.error
+    assert truth.error + reference.error < 1e-4
+
+
 @pytest.mark.parametrize("name", ["gear ratio 0.01", "smooth torque", "inertia ratio 1e-09"])
 def test_the_two_truths_agree_where_both_hold(name: str) -> None:
     """Characteristics, and the two-port with a spring that has a part 1e-9 of the shaft's compliance."""
     case = NAMED[name]
-    waves, ports = exact(case), exact(dataclasses.replace(case, spring=1e9))
+    waves, ports = continuous(case), continuous(dataclasses.replace(case, spring=1e9))
     assert (waves.source, ports.source) == ("characteristics", "exact two-port")
     error, _, _ = distances(ports.values, waves, None)
     # the load of 1e-9 of the shaft's inertia swings on the spring, by its boundary layer
@@ -159,7 +170,7 @@ def test_a_stiff_spring_behind_the_shaft_is_none() -> None:
     plain, sprung = (predicted(dataclasses.replace(case, spring=spring), sw.Lumped(5)) for spring in (0.0, 1e7))
     assert plain is not None
     assert sprung is not None
-    for name in QUANTITIES:
+    for name in ENDS:
         size = np.abs(plain.values[name]).max()
         np.testing.assert_allclose(sprung.values[name], plain.values[name], rtol=0, atol=1e-4 * size)
 
@@ -171,7 +182,7 @@ def test_momentum_is_the_impulse_of_the_motor() -> None:
         run = case.network(model).simulate(case.t_end, t_eval=case.times)
         of_shaft = run["line.omega"] @ np.array(model.mesh().inertias) / model.mesh().intervals * case.inertia
         ends = case.inertia * (case.drive * run["line.omega_a"] + case.load * run["line.omega_b"])
-        given = TORQUE * np.minimum(run.t, case.rise * case.section.delay)
+        given = TORQUE * np.minimum(run.t, case.rise * case.delay)
         # the residue of 1e-10 is that of the propagation, step by step
         assert np.abs(of_shaft + ends - given).max() < 1e-9 * given.max()
 
@@ -217,7 +228,9 @@ def test_a_verdict_needs_evidence(error: float, deviation: float, energy: float,
 
 
 def test_a_silent_failure_reaches_the_table(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An engine whose torques are a tenth too small, in every place where a table could lose it."""
+    """Runs whose torques are a tenth too small, in every place where a table could lose it; the truth is as it was."""
+    truth = exact(NAMED["10 km"])
+    monkeypatch.setattr(sys.modules["shaftwork.studies.stability"], "exact", lambda _: truth)
     read = sw.Solution.__getitem__
     monkeypatch.setattr(sw.Solution, "__getitem__", lambda run, name: read(run, name) * (0.9 if "tau" in name else 1))
     found = stability(["10 km"], models=[sw.Lumped(10), "Wave(3)"], engines=["auto"])
@@ -308,4 +321,4 @@ def test_a_case_is_a_record_that_can_be_made() -> None:
     case = Case("soft tube", length=3.0, diameter=0.05, load=7.0, form="sine", rise=30.0)
     found = stability([case], models=["Spectral(12)"], engines=["auto"])
     assert [cell.verdict for cell in found.cells] == ["right"]
-    assert set(QUANTITIES) == set(exact(case).values)
+    assert set(ENDS) == set(exact(case).values)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import sys
 from pathlib import Path
 
@@ -11,23 +12,29 @@ import pytest
 import sympy
 
 import shaftwork as sw
+from shaftwork.scenes.long_shafts import LOAD_INERTIA, MOTOR_INERTIA, RATED_TORQUE
 from shaftwork.studies.study_arguments import LADDER, rungs
-from shaftwork.studies.truth import QUANTITIES, truth, with_model
-from shaftwork.studies.work_precision import _timed, work_precision
+from shaftwork.studies.truth import QUANTITIES, exact_motion
+from shaftwork.studies.work_precision import _timed, affordable_end, work_precision
 from shaftwork.studies.work_precision_result import Trial, WorkPrecision
+from tests.reference.exact_shafts.exact_motion import JunctionTorque, motion
+from tests.reference.exact_shafts.line import Section, SectionLine
 
 SMALL = (sw.OneSpring(), sw.Lumped(10), sw.Lumped(20), sw.CentralDifference(10), sw.Spectral(8), sw.Wave(3))
 
 
 @pytest.mark.slow
-def test_the_truth_of_a_train_is_that_of_characteristics_and_waves_agree() -> None:
+def test_the_truth_of_a_train_is_that_of_characteristics() -> None:
     net, t = sw.scenes.shaft_step(), np.linspace(0.001, 0.05, 50)
-    known = truth(net, "line", 0.05, t)
-    assert known.source == "characteristics"
-    waves = with_model(net, "line", sw.Wave(3)).simulate(0.05, t_eval=t, rtol=1e-11)
-    for name in ("tau_a", "tau_b", "omega_a", "omega_b"):
-        assert np.abs(waves[f"line.{name}"] - known.values[name]).max() < 1e-9 * np.abs(known.values[name]).max()
-    assert np.abs(waves["line.tau"][:, 1] - known.values["tau_mid"]).max() < 1e-8
+    truth = exact_motion(net, "line", 0.05, t)
+    assert truth.source == "travelling waves"
+    line = SectionLine((Section.of_geometry(1.0, 0.02),), (MOTOR_INERTIA, LOAD_INERTIA))
+    exact = motion(line, [JunctionTorque(0, lambda t: np.full_like(t, RATED_TORQUE))], 0.05)
+    torques = {"tau_a": exact.torque_in(0, t, "left"), "tau_b": exact.torque_in(0, t, "right")}
+    speeds = {"omega_a": exact.junction_speed(0, t), "omega_b": exact.junction_speed(1, t)}
+    for name, values in (torques | speeds).items():
+        assert np.abs(values - truth.values[name]).max() < 1e-9 * np.abs(values).max()
+    assert np.abs(exact.torque(0.5, t) - truth.values["tau_mid"]).max() < 1e-8
 
 
 @pytest.mark.slow
@@ -41,9 +48,9 @@ def test_the_truth_knows_a_shaft_that_is_wired_backwards() -> None:
         return net
 
     t = np.linspace(0.001, 0.02, 20)
-    both = [truth(wired(*nodes), "line", 0.02, t) for nodes in (("m", "l"), ("l", "m"))]
-    assert [known.source for known in both] == ["characteristics"] * 2
-    there, back = (known.values for known in both)
+    both = [exact_motion(wired(*nodes), "line", 0.02, t) for nodes in (("m", "l"), ("l", "m"))]
+    assert [truth.source for truth in both] == ["travelling waves"] * 2
+    there, back = (truth.values for truth in both)
     np.testing.assert_allclose(back["tau_a"], -there["tau_b"], atol=1e-12)
     np.testing.assert_allclose(back["omega_a"], there["omega_b"], atol=1e-12)
     np.testing.assert_allclose(back["tau_mid"], -there["tau_mid"], atol=1e-12)
@@ -53,13 +60,13 @@ def test_the_truth_knows_a_shaft_that_is_wired_backwards() -> None:
 def test_other_networks_have_other_truths() -> None:
     t = np.linspace(0.001, 0.01, 10)
     damped = sw.scenes.shaft_step(damping=1.0)
-    assert truth(damped, "line", 0.01, t).source == "Spectral(64)"
+    assert exact_motion(damped, "line", 0.01, t).source == "Spectral(64)"
     net = sw.Network("motor")
     net.add(sw.KlossMotor("motor", tau_k=30.0, s_k=0.2, n_sync=1500), "m")
     net.add(sw.Inertia("Je", J=0.025), "m")
     net.add(sw.Shaft("line", length=1.0, diameter=0.02), "m", "l")
     net.add(sw.Inertia("Jm", J=0.11), "l")
-    assert truth(net, "line", 0.01, t).source == "travelling waves"
+    assert exact_motion(net, "line", 0.01, t).source == "travelling waves"
 
 
 @pytest.mark.slow
@@ -164,6 +171,14 @@ def test_a_model_that_takes_too_long_is_given_up_and_says_when(monkeypatch: pyte
         _timed(net.compile(), "line", Trial("", "scipy", 0, 0.0, np.inf, {}, asked="scipy"), 0.01, np.array([0.01]))
 
 
+def test_a_motion_that_takes_too_long_is_compared_over_a_part_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A clock that goes on by three seconds each time it is read stands for a slow engine."""
+    module, clock = sys.modules["shaftwork.studies.work_precision"], itertools.count(step=3)
+    assert affordable_end(sw.scenes.bldc_shaft(), "line", 0.002) == 0.002
+    monkeypatch.setattr(module.time, "thread_time", lambda: float(next(clock)))
+    assert 0 < affordable_end(sw.scenes.bldc_shaft(), "line", 0.02) < 0.01
+
+
 def test_models_are_named_with_sizes_or_without() -> None:
     assert rungs(["Lumped"], [5, 7]) == (sw.Lumped(5), sw.Lumped(7))
     assert rungs(["Lumped(3)", "OneSpring"], [5]) == (sw.Lumped(3), sw.OneSpring())
@@ -205,7 +220,7 @@ def test_a_tighter_tolerance_is_a_row_of_its_own_and_courses_are_laid_over_each_
     assert "rtol" in str(study).splitlines()[1]
     upper, lower = study.plot_courses("a").axes
     drawn = {line.get_label(): line.get_ydata() for line in upper.lines}
-    np.testing.assert_array_equal(drawn["characteristics"], study.courses[:, 0])
+    np.testing.assert_array_equal(drawn["travelling waves"], study.courses[:, 0])
     apart = np.abs(drawn[tight.model] - study.courses[:, 0])
     # drawn at a rounding of the largest torque at least, so that a motion that is the exact one has a picture
     np.testing.assert_allclose(lower.lines[0].get_ydata(), apart, rtol=0, atol=1e-12 * np.abs(study.courses).max())

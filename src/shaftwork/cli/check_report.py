@@ -13,14 +13,12 @@ from scipy import sparse
 from shaftwork.codegen.compiled_model import CompiledModel
 from shaftwork.core.errors import SimulationError
 from shaftwork.core.screen import counted
+from shaftwork.frequency.eigenvalues import LARGEST_DENSE
 from shaftwork.frequency.natural_modes import natural_frequencies
 from shaftwork.hybrid.named_phases import whole_name
 from shaftwork.hybrid.phased_model import PhasedModel
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.network import Network
-
-LARGEST_DENSE = 1500
-"""States up to which all eigenvalues are computed."""
 
 
 def structure_report(net: Network, model: Model, t_end: float) -> str:

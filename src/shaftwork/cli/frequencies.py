@@ -7,9 +7,10 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from functools import partial
 
 from shaftwork.cli.command import Data, Say, command, folder_option, load, point_of, point_options
-from shaftwork.cli.folder import Folder, write_picture, write_rows
+from shaftwork.cli.folder import Folder, write_picture
 from shaftwork.cli.settings import follows_speed, point
 from shaftwork.core.errors import ParameterError
+from shaftwork.core.files import write_rows
 
 HEAD = ("mode", "frequency [Hz]", "damping", "rate, real part [1/s]", "rate, imaginary part [1/s]", "moves most")
 SPEEDS = 61

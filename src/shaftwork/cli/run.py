@@ -17,8 +17,9 @@ from shaftwork.cli.command import (
     start_of,
     start_options,
 )
-from shaftwork.cli.folder import Folder, write_picture, write_rows
+from shaftwork.cli.folder import Folder, write_picture
 from shaftwork.core.domains import DOMAINS
+from shaftwork.core.files import write_rows
 from shaftwork.core.screen import counted, progress
 
 if TYPE_CHECKING:

@@ -139,6 +139,7 @@ def compare(options: Namespace, say: Say) -> Data:
     from shaftwork.components.shafts import Shaft
     from shaftwork.studies import work_precision
     from shaftwork.studies.study_arguments import rungs
+    from shaftwork.studies.work_precision import affordable_end
     from shaftwork.studies.work_precision_result import milliseconds
 
     net, scene = load(options)
@@ -147,9 +148,16 @@ def compare(options: Namespace, say: Say) -> Data:
         raise ParameterError(
             f"'{net.name}' has no shaft whose models could be compared. Try: shaftwork compare shaft-step."
         )
-    t_end = end_of(options, scene)
-    t_end = t_end if options.t_end is not None else min(t_end, COMPARED)
+    shaft = options.shaft or shafts[0]
+    wanted = end_of(options, scene)
+    wanted = wanted if options.t_end is not None else min(wanted, COMPARED)
     folder = Folder(options.out, COMPARISON_FILES, options.line) if options.out else None
+    t_end = affordable_end(net, shaft, wanted) if shaft in shafts else wanted
+    if t_end < wanted and options.t_end is None:
+        tell(f"{wanted:g} s of motion take too long with the engines that are installed; --t-end asks for them")
+    elif t_end < wanted:
+        tell(f"--t-end {wanted:g} takes too long with the engines that are installed; --t-end {t_end:g} would not")
+        t_end = wanted
     tell(
         f"comparing over {t_end:g} s of motion (--t-end), for {options.budget:g} s of CPU (--budget) once it is known:"
     )
@@ -163,7 +171,7 @@ def compare(options: Namespace, say: Say) -> Data:
     try:
         study = work_precision(
             net,
-            options.shaft or shafts[0],
+            shaft,
             t_end=t_end,
             models=rungs(options.models, options.sizes),
             engines=options.engines,

@@ -7,7 +7,7 @@ import errno
 import os
 import shutil
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import IO
 
@@ -42,3 +42,15 @@ def replaced(path: str | Path) -> Iterator[IO[str]]:
         raise
     finally:
         draft.unlink(missing_ok=True)
+
+
+def write_rows(path: str | Path, head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Write a table as CSV.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    import csv
+
+    with replaced(path) as file:
+        csv.writer(file, lineterminator="\n").writerows([head, *rows])

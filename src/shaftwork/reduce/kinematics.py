@@ -17,7 +17,7 @@ from shaftwork.network.kinds import Kind
 from shaftwork.network.wording import listed
 
 AGREE = 1e-12
-"""Two ways round a train have one ratio when they differ by less than this fraction: only rounding."""
+"""A fraction that is only rounding: of two ratios round a train, of a speed or of an inertia."""
 
 
 @dataclass(frozen=True)

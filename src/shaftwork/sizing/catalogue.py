@@ -15,15 +15,14 @@ from shaftwork.components.motor_catalogue import Nameplate
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si, numbers_in_si
 from shaftwork.results.observer import RPM, Array
+from shaftwork.sizing.motor_shaft import SMALLEST
 
 OWN = Path(__file__).with_name("motors.csv")
 TYPICAL = "chosen: typical of a motor of this frame size and power; frame sizes by power after EN 50347"
 CONSISTENT = 0.05
 """Rated power and torque times speed may differ by this fraction: catalogues round."""
-ROUNDING = 1e-9
-"""A speed that is higher by this fraction is not above a limit."""
 SHOWN = 8
-"""Mistakes of a file that are named at once."""
+"""Mistakes of a file, and motors of a choice, that are named at once."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,7 +108,7 @@ class CatalogueMotor:
         speeds = np.asarray(numbers_in_si("n", n, "1/min"), dtype=float)
         n_k = self.n_sync * (1 - self.nameplate.s_k)
         weakened = self.tau_k * (n_k / np.maximum(speeds, n_k)) ** 2
-        return np.where(speeds <= self.fastest * (1 + ROUNDING), weakened, 0.0)
+        return np.where(speeds <= self.fastest * (1 + SMALLEST), weakened, 0.0)
 
 
 NUMBERS: Mapping[str, tuple[str, Mapping[str, Any]]] = {

@@ -15,9 +15,8 @@ from shaftwork.core.parameters import in_si
 from shaftwork.results.course import turning_points
 from shaftwork.results.observer import RPM, Array
 from shaftwork.results.quadrature import LobattoPanels, integrate
-from shaftwork.sizing.motor_shaft import SMALLEST, MotorShaft, motor_shaft, run_up
-from shaftwork.sizing.reserve import Limit, Reserve, reserve_of
-from shaftwork.sizing.speed_torque import speed_torque_plane
+from shaftwork.sizing.motor_shaft import REST, SMALLEST, MotorShaft, motor_shaft, run_up
+from shaftwork.sizing.reserve import Limit, Reserve, reserve_of, speed_torque_plane
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,10 +25,6 @@ if TYPE_CHECKING:
 TYPES = ("S1", "S3")
 LONG_CYCLE = 600.0
 """Duration of a duty cycle in s that IEC 60034-1, 4.2.3, takes where none is agreed on."""
-ROUNDING = 1e-12
-"""Part of a motion by which a cycle of its length may seem shorter: it starts and ends at times of any size."""
-BRIEF = 1e-9
-"""Part of a cycle that is no time: at the ends of standstill a torque may be read that jumps there."""
 
 
 @dataclass(frozen=True)
@@ -240,7 +235,7 @@ class Duty:
         """Times in s at which the speed jumps, the start of the motion among them where it jumps from rest."""
         shaft, start, ends = self.shaft, self.shaft.steps[:1], self.shaft.steps[1:]
         before, after = shaft.omega(np.nextafter(ends, -np.inf)), shaft.omega(ends)
-        least, prescribed = BRIEF * shaft.omega_top, abs(shaft.omega_prescribed)
+        least, prescribed = SMALLEST * shaft.omega_top, abs(shaft.omega_prescribed)
         return np.concatenate([start[[prescribed > least]], ends[np.abs(after - before) > least]])
 
     @property
@@ -252,7 +247,7 @@ class Duty:
             notes.append(
                 f"at the motor's shaft, before {whose}: ratio {shaft.ratio:g}, efficiency {shaft.efficiency:g}"
             )
-        if self.held > BRIEF * self.duration:
+        if self.held > SMALLEST * self.duration:
             notes.append(f"torque is held at standstill for {self.held:.6g} s; at_rest='released' if a brake does that")
         start, last = shaft.steps[0], "what an inertia rigidly there takes at once is in no figure"
         if start in self.jumps:
@@ -318,7 +313,7 @@ def duty(
     shaft = motor_shaft(solution, motor, (torque, speed), (ratio, efficiency), released=at_rest == "released")
     motion = float(shaft.steps[-1] - shaft.steps[0])
     whole = motion if cycle is None else in_si("cycle", cycle, "s", above=0)
-    if whole < motion * (1 - ROUNDING):
+    if whole < motion * (1 - REST):
         raise ParameterError(f"cycle = {whole:g} s is shorter than the motion of {motion:g} s. Simulate less of it.")
     cold = in_si("cooling", cooling, above=0, at_most=1)
     n_full = shaft.omega_top * RPM if n_cooling is None else in_si("n_cooling", n_cooling, "1/min", above=0)

@@ -15,10 +15,10 @@ from shaftwork.core.errors import ParameterError, imported
 from shaftwork.core.parameters import in_si
 from shaftwork.results.observer import RPM, Array
 from shaftwork.results.quadrature import LobattoPanels
-from shaftwork.sizing.catalogue import ROUNDING, CatalogueMotor, catalogue
+from shaftwork.sizing.catalogue import SHOWN, CatalogueMotor, catalogue
 from shaftwork.sizing.duty import Duty, cooling_at
-from shaftwork.sizing.motor_shaft import REST, zeros
-from shaftwork.sizing.speed_torque import speed_torque_plane
+from shaftwork.sizing.motor_shaft import REST, SMALLEST, zeros
+from shaftwork.sizing.reserve import speed_torque_plane
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 OVERLOAD = 1.3
 """Pull-out torque over the largest torque that is asked for: chosen, what drive practice leaves for voltage drops and
 the tolerance of 10 % that IEC 60034-1 gives the pull-out torque."""
-SHOWN = 8
-"""Motors that fit, and motors that do not, in the printed table."""
 BRIEF = 1e-5
 """Panels of less than this part of a motion close in a jump; slopes in them are those of rounding."""
 UNCHECKED = (
@@ -261,7 +259,7 @@ def _candidate(demand: _Demand, motor: CatalogueMotor, contained: float, overloa
 
 
 def _reasons(motor: CatalogueMotor, thermal: float, reserve: float, n_top: float, overload: float) -> Iterator[str]:
-    if n_top > motor.fastest * (1 + ROUNDING):
+    if n_top > motor.fastest * (1 + SMALLEST):
         yield f"speed {n_top:.4g} above {motor.fastest:.4g} 1/min"
     elif reserve < overload:
         yield f"overload reserve {reserve:.3g} below {overload:.3g}"

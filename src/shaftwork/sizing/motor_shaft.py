@@ -24,15 +24,17 @@ from shaftwork.results.reader import Read
 from shaftwork.results.solution import Solution
 
 SMALLEST = 1e-9
-"""Ups and downs of less than this part of the range make no peak."""
+"""Less than this part of a range, a cycle or a limit is none: ups and downs make no peak, jumps take no time, and what
+is above a limit by it is not above it."""
 REST = 1e-12
-"""A speed that stays within this part of the highest one may be standstill, such a torque none: see `is_nothing`."""
-CONSTANT = 4 * float(np.finfo(float).eps)
-"""What changes by no more than this part of itself is constant."""
+"""A speed that stays within this part of the highest one may be standstill, such a torque none: see `is_nothing`. Times
+that differ by this part of a motion are one."""
+EPS = float(np.finfo(float).eps)
+CONSTANT, FLAT = 4 * EPS, 45 * EPS
+"""What changes by no more than this part of itself is constant; a step in which the speed changes by no more than this
+part of the highest one is part of a plateau."""
 SAMPLES = 4001
-"""Times among which a speed is looked for."""
-FLAT = 1e-14
-"""A step in which the speed changes by no more than this part of the highest one is part of a plateau."""
+"""Times among which a speed is looked for, and those of a curve of a whole motion."""
 GEARED = ("ratio", "efficiency")
 """Parameters of a motor that has a gear of its own."""
 

@@ -1,13 +1,14 @@
-"""What torque a motor can give, by a limit or its own curve, and how far the torque of a motion stays below it."""
+"""What torque a motor can give, by a limit or its own curve, and a motion beside it: its reserve and its picture."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.optimize.elementwise import find_minimum
 
 from shaftwork.codegen.model_observer import ModelObserver
 from shaftwork.components.base import Component
@@ -19,7 +20,13 @@ from shaftwork.core.parameters import in_si
 from shaftwork.pipeline.network import Network
 from shaftwork.results.course import turning_points
 from shaftwork.results.observer import RPM, Array
-from shaftwork.sizing.motor_shaft import SMALLEST, MotorShaft
+from shaftwork.results.plotting import new_figure
+from shaftwork.sizing.catalogue import CatalogueMotor
+from shaftwork.sizing.motor_shaft import SAMPLES, SMALLEST, MotorShaft
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 Limit = float | Table | Callable[[Array], Array] | None
 """Largest torque in size, N m, over the motor's speed without sign in 1/min; None for the motor's own."""
@@ -27,14 +34,12 @@ Curve = Callable[[Array, Array], Array]
 """A torque in N m at times (k,) in s and speeds (k,): of a motor in rad/s, largest ones without sign in 1/min."""
 INSTANTS = 257
 """At which the pull-out torque of a motor is looked for that changes with time; between them it is a straight line."""
-NO_LIMIT = 1e9
+NO_LIMIT = 1 / SMALLEST
 """Torque over its limit where there is none left of it."""
-EQUAL = 1e-9
-"""Reserves that differ by less, as a part of themselves, are equal; it is the first instant that counts."""
-SPEEDS, ROUNDS, FINER = 129, 5, 17
-"""Speeds among which the largest torque is looked for; how often, and among how many, between those beside it."""
-BEYOND = 1.5
-"""The search goes to this many times the highest speed, both ways."""
+SPEEDS, BEYOND = 129, 1.5
+"""Speeds among which the largest torque is looked for, up to this many times the highest speed, both ways."""
+CURVE, CURVES = 400, 4
+"""Points of a curve of torque over speed; curves of a motor that changes its own with time, at equal steps of time."""
 AS_ARRAY = (
     "Let it take an array of speeds in 1/min and give as many torques in N m: lambda n: np.where(n < 1500, 20.0, 10.0)."
 )
@@ -76,7 +81,7 @@ def reserve_of(shaft: MotorShaft, limit: Limit) -> Reserve:
             return np.where(tau == 0, 0.0, np.minimum(np.abs(tau) / most, NO_LIMIT))
 
     worst = turning_points(used, shaft.steps, smallest=SMALLEST)
-    place = int((worst.values >= (1 - EQUAL) * worst.values.max()).argmax())
+    place = int((worst.values >= (1 - SMALLEST) * worst.values.max()).argmax())
     time = worst.t[place : place + 1]
     (tau,), (omega,) = shaft.read(time)
     (most,) = limited(time, np.abs([omega]) * RPM)
@@ -171,19 +176,83 @@ def _pull_out(curve: Curve, times: Array, top: float) -> Array:
         times: (k,) s.
         top: a speed in rad/s that is not far below those of the curve.
     """
-    rows = np.arange(len(times))
-    low, high = np.full(len(times), -BEYOND * top), np.full(len(times), BEYOND * top)
-    best = np.zeros(len(times))
-    for number in (SPEEDS, *([FINER] * ROUNDS)):
-        omega = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, number)
-        tau = np.abs(curve(np.repeat(times, number), omega.ravel())).reshape(omega.shape)
-        at = tau.argmax(axis=1)
-        best = np.maximum(best, tau[rows, at])
-        low, high = omega[rows, np.maximum(at - 1, 0)], omega[rows, np.minimum(at + 1, number - 1)]
-    return best
+    omega = np.linspace(-BEYOND * top, BEYOND * top, SPEEDS)
+    tau = np.abs(curve(np.repeat(times, SPEEDS), np.tile(omega, len(times)))).reshape(len(times), SPEEDS)
+    near = np.clip(tau.argmax(axis=1), 1, SPEEDS - 2)
+    bracket = omega[near - 1], omega[near], omega[near + 1]
+    peak = find_minimum(lambda w, t: -np.abs(curve(t, w)), bracket, args=(times,))
+    return np.asarray(np.where(peak.success, -peak.f_x, tau.max(axis=1)))
 
 
 def _fastest(motor: Component, top: float) -> float:
     """The highest speed in rad/s that a motor's curve is about: of the motion, or synchronous."""
     value = motor.declared["n_sync"].magnitude(motor.values["n_sync"])[0] if "n_sync" in motor.declared else 0.0
     return max(top, float(value) / RPM)
+
+
+def speed_torque_plane(shaft: MotorShaft, thermal: float, limit: Limit | CatalogueMotor) -> Figure:
+    """The trajectory, the effective torque, the motor's own curve and, where there is one, a limit in all quadrants.
+
+    Args:
+        shaft: of the motor, in the motion.
+        thermal: torque that heats the motor as the motion does, N m.
+        limit: as of `Duty.reserve`, or a motor of a catalogue.
+
+    Raises:
+        MissingExtraError: matplotlib is not installed.
+        ParameterError: the limit is none.
+    """
+    figure = new_figure("Duty.plot()", 8.0, 5.5)
+    axes = figure.subplots()
+    times, tau, n = _trajectory(shaft)
+    points = axes.scatter(n, tau, c=times, s=4, cmap="viridis", zorder=3)
+    figure.colorbar(points, ax=axes, label="t in s")
+    axes.plot(n, tau, color="0.6", linewidth=0.6, zorder=2)
+    top = 1.15 * max(shaft.omega_top * RPM, limit.fastest if isinstance(limit, CatalogueMotor) else 0.0)
+    speeds = np.linspace(-top if n.min() < -1e-6 * top else 0.0, top, CURVE)
+    _draw_own(axes, shaft, speeds)
+    if limit is not None:
+        _draw_limit(axes, shaft, limit, speeds)
+    axes.axhline(thermal, color="tab:orange", linestyle="--", linewidth=1, label="thermal torque, S1")
+    axes.axhline(0.0, color="0.3", linewidth=0.8)
+    axes.axvline(0.0, color="0.3", linewidth=0.8)
+    axes.set_xlabel("speed in 1/min")
+    axes.set_ylabel("torque in N m")
+    axes.grid(alpha=0.3)
+    axes.legend(loc="best", frameon=False, fontsize="small")
+    axes.set_title(f"{shaft.solution.name}: {shaft.name} at its own shaft", fontsize="medium")
+    return figure
+
+
+def _trajectory(shaft: MotorShaft) -> tuple[Array, Array, Array]:
+    """Times, torques and speeds, both sides of every step's end among them."""
+    steps = shaft.steps
+    times = np.unique(
+        np.concatenate([np.linspace(steps[0], steps[-1], SAMPLES), steps, np.nextafter(steps[1:], -np.inf)])
+    )
+    tau, omega = shaft.read(times)
+    return times, tau, omega * RPM
+
+
+def _draw_own(axes: Axes, shaft: MotorShaft, speeds: Array) -> None:
+    """The motor's own curve; several where it changes with time."""
+    curve = own_curve(shaft.part, shaft.steps)
+    if curve is None:
+        return
+    instants = np.linspace(shaft.steps[0], shaft.steps[-1], CURVES + 2)[1:-1]
+    curves = [curve(np.full(CURVE, time), speeds / RPM) for time in instants.tolist()]
+    steady = all(np.array_equal(curves[0], torques) for torques in curves)
+    for time, torques in list(zip(instants.tolist(), curves, strict=True))[: 1 if steady else CURVES]:
+        label = f"curve of {shaft.name}" if steady else f"curve of {shaft.name} at {time:.3g} s"
+        axes.plot(speeds, torques, linewidth=1.2, alpha=0.8, label=label)
+
+
+def _draw_limit(axes: Axes, shaft: MotorShaft, limit: Limit | CatalogueMotor, speeds: Array) -> None:
+    """The limit, motoring and braking, and the rated torque of a motor of a catalogue."""
+    name = "limit"
+    if isinstance(limit, CatalogueMotor):
+        axes.axhline(limit.tau_n, color="tab:green", linestyle="--", linewidth=1, label="rated torque")
+        name, limit = f"limit of {limit.name}", limit.limit
+    most = limits(shaft, limit)(np.full(CURVE, shaft.steps[-1]), np.abs(speeds))
+    axes.plot(speeds, most, color="tab:red", linewidth=1.2, label=name)
+    axes.plot(speeds, -most, color="tab:red", linewidth=1.2)

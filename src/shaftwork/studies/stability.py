@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import re
 import time
 import warnings
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
@@ -15,16 +14,18 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 
 from shaftwork.components.shaft_models import ShaftModel, Wave
-from shaftwork.core.errors import MissingExtraError, ParameterError, ShaftworkError, SimulationError, in_one_line
-from shaftwork.core.files import replaced
+from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError, in_one_line
+from shaftwork.core.files import write_rows
 from shaftwork.core.screen import in_columns
 from shaftwork.integrate.engines import ENGINES, available
 from shaftwork.pipeline.arguments import NOMINAL
 from shaftwork.pipeline.model import Model
 from shaftwork.results.observer import Array
+from shaftwork.results.plotting import new_figure
 from shaftwork.studies.stability_cases import CASES, TORQUE, Case
-from shaftwork.studies.stability_truth import QUANTITIES, EndMotion, exact, predicted
 from shaftwork.studies.study_arguments import engine_names, several, shaft_models, text_of
+from shaftwork.studies.truth import ENDS, MOST_PREDICTED, ShaftMotion, exact, predicted
+from shaftwork.studies.work_precision_result import FLOOR
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,8 +34,9 @@ RIGHT = 1e-2
 """Largest error of what is right, of the largest torque or speed."""
 SAME = 1e-3
 """Largest deviation of a run from what its model must do, and largest residual of its energy balance."""
-MOST_BALANCED = 500
-"""Up to so many states, where all of the motion is output, the energy balance is drawn for the engine "auto"."""
+MOST_BALANCED = 2 * MOST_PREDICTED
+"""Up to so many states, a speed and a torque for each element, the energy balance is drawn for the engine "auto", where
+all of the motion is output."""
 
 Verdict = Literal["right", "coarse", "warned", "refused", "failed", "too long", "unknown", "wrong"]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
@@ -127,10 +129,7 @@ class Stability:
     def to_csv(self, path: str | Path) -> None:
         """Write every cell with all that is known about it."""
         names = tuple(Cell.__dataclass_fields__)
-        with replaced(path) as file:
-            writer = csv.writer(file)
-            writer.writerow(names)
-            writer.writerows([getattr(cell, name) for name in names] for cell in self.cells)
+        write_rows(path, names, ([getattr(cell, name) for name in names] for cell in self.cells))
 
     def plot(self) -> Figure:
         """The table as a coloured matrix (extra `plot`)."""
@@ -144,9 +143,9 @@ def stability(
 ) -> Stability:
     """Run extreme drives with every shaft model and every engine, and judge each run by what is independent of it.
 
-    The truth is that of characteristics or of the exact two-port; the error that a model may have is that of its own
-    matrices, exponentiated. A run that is neither right nor as coarse as its model must be, and that says nothing, is
-    wrong.
+    The truth is that of travelling waves, or with damping of polynomials of high degree; the error that a model may
+    have is that of its own matrices, exponentiated. A run that is neither right nor as coarse as its model must be,
+    and that says nothing, is wrong.
 
     Args:
         cases: cases, or names of those in `CASES`.
@@ -173,7 +172,7 @@ def _named(name: str) -> Case:
     raise ParameterError(f"There is no case {name!r}. There are: {', '.join(case.name for case in CASES)}.")
 
 
-def _row(case: Case, model: ShaftModel, engines: Sequence[str], truth: EndMotion) -> list[Cell]:
+def _row(case: Case, model: ShaftModel, engines: Sequence[str], truth: ShaftMotion) -> list[Cell]:
     """One model with each engine."""
     ideal = truth if isinstance(model, Wave) else predicted(case, model)
     label = (case.name, text_of(model))
@@ -192,8 +191,8 @@ def _cell(
     label: tuple[str, str],
     compiled: Model,
     engine: str,
-    truth: EndMotion,
-    ideal: EndMotion | None,
+    truth: ShaftMotion,
+    ideal: ShaftMotion | None,
     warned: str,
 ) -> Cell:
     began = time.process_time()
@@ -201,7 +200,7 @@ def _cell(
         with warnings.catch_warnings(record=True) as said:
             warnings.simplefilter("always")
             run = compiled.simulate(case.t_end, t_eval=case.times, engine=engine, max_steps=case.steps)  # type: ignore[arg-type]
-            quantities = {name: run[f"line.{name}"] for name in QUANTITIES}
+            quantities = {name: run[f"line.{name}"] for name in ENDS}
             cpu = time.process_time() - began
             balanced = engine == "auto" and not case.periods and len(compiled.states) <= MOST_BALANCED
             energy = run.energy_residual if balanced else np.nan
@@ -217,7 +216,7 @@ def _cell(
     return Cell(*label, engine, run.engine, verdict, measured, expected, deviation, energy, cpu, why)
 
 
-def distances(run: dict[str, Array], truth: EndMotion, ideal: EndMotion | None) -> tuple[float, float, float]:
+def distances(run: Mapping[str, Array], truth: ShaftMotion, ideal: ShaftMotion | None) -> tuple[float, float, float]:
     """Of a run from the truth, of its model's own motion from the truth, and of the run from that motion.
 
     All are the largest over time and quantities, of the largest torque or speed of the truth and of the model's own
@@ -229,8 +228,8 @@ def distances(run: dict[str, Array], truth: EndMotion, ideal: EndMotion | None) 
             kind = name.partition("_")[0]
             sizes[kind] = max(sizes[kind], float(np.abs(values).max()))
 
-    def distance(one: dict[str, Array], other: dict[str, Array]) -> float:
-        gaps = [np.abs(one[name] - other[name]).max() / sizes[name.partition("_")[0]] for name in QUANTITIES]
+    def distance(one: Mapping[str, Array], other: Mapping[str, Array]) -> float:
+        gaps = [np.abs(one[name] - other[name]).max() / sizes[name.partition("_")[0]] for name in ENDS]
         return float(np.max(gaps))
 
     if ideal is None:
@@ -268,8 +267,6 @@ COLOURS = {
     "unknown": "#b59ad6",
     "wrong": "#d62728",
 }
-LEAST = 1e-16
-"""Errors below are drawn as this one."""
 COLUMN, LETTER = 0.24, 0.075
 """Least width of a column, and width of a letter above the columns, in inches."""
 SIZE = re.compile(r"\b(?:m|n|places)=\d+(?:, )?")
@@ -280,12 +277,6 @@ def _figure(study: Stability) -> Figure:
 
     Models that differ by their size alone share columns, unless a case has several of them.
     """
-    try:
-        from matplotlib.colors import ListedColormap
-        from matplotlib.figure import Figure
-        from matplotlib.patches import Patch
-    except ImportError:
-        raise MissingExtraError("matplotlib", "plot", "Stability.plot()") from None
     engines, cases = study.engines, tuple(dict.fromkeys(cell.case for cell in study.cells))
     kind_of = _kinds(study)
     kinds = tuple(dict.fromkeys(kind_of.values()))
@@ -293,14 +284,17 @@ def _figure(study: Stability) -> Figure:
     names = list(COLOURS)
     longest = max(len(line) for kind in kinds for line in kind.splitlines())
     width = max(COLUMN * len(engines), LETTER * (longest + 2)) * len(kinds)
-    figure = Figure(figsize=(max(2.5 + width, 8.0), 2.4 + 0.22 * len(cases)), layout="constrained")
+    figure = new_figure("Stability.plot()", max(2.5 + width, 8.0), 2.4 + 0.22 * len(cases))
+    from matplotlib.colors import ListedColormap
+    from matplotlib.patches import Patch
+
     axes = figure.subplots()
     for cell in study.cells:
         row = cases.index(cell.case)
         column = kinds.index(kind_of[cell.model]) * len(engines) + engines.index(cell.engine)
         numbers[row, column] = 1 + names.index(cell.verdict)
         if np.isfinite(cell.error):
-            exponent = int(np.ceil(np.log10(max(cell.error, LEAST))))
+            exponent = int(np.ceil(np.log10(max(cell.error, FLOOR))))
             colour = "white" if cell.verdict in ("right", "wrong") else "black"
             axes.text(column, row, str(exponent), ha="center", va="center", fontsize=6, color=colour)
     axes.imshow(numbers, cmap=ListedColormap(["#ffffff", *COLOURS.values()]), vmin=0, vmax=len(names), aspect="auto")

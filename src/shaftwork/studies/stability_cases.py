@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
@@ -19,10 +19,9 @@ from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
 from shaftwork.pipeline.network import Network
 from shaftwork.results.observer import Array
-from shaftwork.studies.exact_shafts.line import Section
 
-DENSITY, SHEAR_MODULUS = 7900.0, 77.5e9
-"""Of steel, kg/m^3 and Pa."""
+DENSITY, SHEAR_MODULUS = (float(Shaft.declared[name].default) for name in ("density", "shear_modulus"))
+"""Of a shaft where nothing is said of them, kg/m^3 and Pa."""
 TORQUE = 10.0
 """Height of the torque in N m; every case is linear."""
 POINTS = 100
@@ -87,33 +86,51 @@ class Case:
             in_si(name, getattr(self, name), above=0)
 
     @property
-    def section(self) -> Section:
-        """The shaft by its constants."""
-        bare = Section.of_geometry(self.length, self.diameter, density=DENSITY, shear_modulus=SHEAR_MODULUS)
-        # two inertias J_s at a spring C'/L turn against each other at sqrt(2)/delay
-        return replace(bare, damping=math.sqrt(2) * self.damping * bare.stiffness * bare.delay)
+    def area_moment(self) -> float:
+        """Of the shaft, m^4."""
+        return math.pi / 32 * self.diameter**4
 
     @property
     def inertia(self) -> float:
-        """Of the shaft, kg m^2."""
-        return self.section.inertia * self.section.length
+        """Of the whole shaft, kg m^2."""
+        return DENSITY * self.area_moment * self.length
+
+    @property
+    def stiffness(self) -> float:
+        """Of the whole shaft as one spring, N m/rad."""
+        return SHEAR_MODULUS * self.area_moment / self.length
+
+    @property
+    def delay(self) -> float:
+        """Time that a wave takes through the shaft, s."""
+        return self.length * math.sqrt(DENSITY / SHEAR_MODULUS)
+
+    @property
+    def impedance(self) -> float:
+        """Torque over speed of a wave, N m s/rad."""
+        return self.area_moment * math.sqrt(DENSITY * SHEAR_MODULUS)
+
+    @property
+    def dashpot(self) -> float:
+        """Damping of the whole shaft as one dashpot, N m s/rad."""
+        # two inertias of the shaft's own at this spring turn against each other at sqrt(2)/delay
+        return math.sqrt(2) * self.damping * self.stiffness * self.delay
 
     @property
     def t_end(self) -> float:
         """End of the motion, s."""
-        delay = self.section.delay
-        return 2 * delay * self.periods if self.periods else delay * self.delays
+        return self.delay * (2 * self.periods or self.delays)
 
     @property
     def times(self) -> Array:
         """(POINTS,) output times, s."""
-        span = 2 * self.section.delay if self.periods else self.t_end
+        span = 2 * self.delay if self.periods else self.t_end
         return self.t_end - span * (np.arange(POINTS, 0, -1) - 0.5) / POINTS
 
     @property
     def torque(self) -> sympy.Expr:
         """Of the motor, as a law of time in N m."""
-        rise = self.rise * self.section.delay
+        rise = self.rise * self.delay
         return {
             "step": sympy.Float(TORQUE),
             "pulse": Step(TORQUE) - Step(TORQUE, start=rise),
@@ -123,7 +140,6 @@ class Case:
 
     def network(self, model: ShaftModel) -> Network:
         """The drive with a model of its shaft."""
-        section = self.section
         net = Network(self.name)
         net.add(TorqueSource("motor", tau=self.torque), "a")
         if self.drive:
@@ -132,9 +148,7 @@ class Case:
             "line",
             length=self.length,
             diameter=self.diameter,
-            density=DENSITY,
-            shear_modulus=SHEAR_MODULUS,
-            damping=section.damping,
+            damping=self.dashpot * self.length,
             model=model,
         )
         net.add(shaft, "a", "b")
@@ -143,14 +157,14 @@ class Case:
             net.add(Gear("gear", ratio=self.ratio), "b", "c")
             end = "c"
         if self.spring:
-            net.add(Spring("spring", c=self.spring * self.ratio**2 * section.stiffness / section.length), end, "d")
+            net.add(Spring("spring", c=self.spring * self.ratio**2 * self.stiffness), end, "d")
             end = "d"
         if self.clamped:
             net.add(Ground("wall"), end)
         if self.load and not self.clamped:
             net.add(Inertia("load", J=self.load * self.ratio**2 * self.inertia), end)
         if self.damper and not self.clamped:
-            net.add(Damper("brake", d=self.damper * self.ratio**2 * section.impedance), end)
+            net.add(Damper("brake", d=self.damper * self.ratio**2 * self.impedance), end)
         return net
 
 

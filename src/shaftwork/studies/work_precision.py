@@ -21,19 +21,30 @@ from shaftwork.pipeline.network import Network
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
 from shaftwork.studies.study_arguments import LADDER, engine_names, several, shaft_models, text_of
-from shaftwork.studies.truth import MODES, QUANTITIES, Truth, frequencies, quantities, truth, with_model
+from shaftwork.studies.truth import (
+    COARSE,
+    MODES,
+    QUANTITIES,
+    ShaftMotion,
+    exact_frequencies,
+    exact_motion,
+    frequencies,
+    quantities,
+    with_model,
+)
 from shaftwork.studies.work_precision_result import RTOL, Trial, WorkPrecision
 
 POINTS, CALLS = 401, 5
 """Output times, and warm calls of which the median counts."""
-SLOW = 3.0
-"""Where set-up and run have taken longer, in s of CPU, larger models of its kind are left out."""
 LONGEST = 5.0
-"""A run is given up after so long, s of CPU."""
+"""A run is given up after so long, s of CPU. Of a kind that took half of it, larger models are left out."""
+FINER_COSTS = 10.0
+"""Times as long as a coarse model the finest ones of a nonlinear network take, about."""
 BUDGET = 45.0
 """CPU time in s for all trials, from when the truth is known."""
-LOWEST = 20
-"""Modes of a model that are computed, those of smallest rate; as many as the exact ones up to f_5 and their doubles."""
+LOWEST = 4 * (MODES + 2)
+"""Modes of a model that are computed, those of smallest rate: twice as many pairs as there are exact ones up to the
+second beyond those that are judged, since a model may have spurious ones between them."""
 
 
 def work_precision(
@@ -66,7 +77,7 @@ def work_precision(
         points: number of output times.
         budget: CPU time in s for all trials together, from when the truth is known. The smallest model of each kind is
             tried in any case, with every engine and tolerance; then the next sizes of all. A run is given up after
-            `LONGEST` s of CPU, and larger models of a kind that took `SLOW` s are left out.
+            `LONGEST` s of CPU, and larger models of a kind that took half of it are left out.
         report: is told of each trial when it is done.
         tell: is told what is done meanwhile, in a line.
 
@@ -87,9 +98,34 @@ def work_precision(
     ]
     # the fronts of waves that start at zero pass at multiples of the delay; these times are none
     t = end * (np.arange(1, count + 1) - 0.5) / count
-    exact = truth(net, shaft, end, t, tell or _nothing)
-    trials = _tried(_Motion(net, shaft, end, t, exact), planned, allowed, report or _nothing)
+    tell = tell or _nothing
+    tell("the exact natural frequencies")
+    judged = exact_frequencies(net, shaft)
+    exact = exact_motion(net, shaft, end, t, tell)
+    trials = _tried(_Motion(net, shaft, end, t, exact, judged), planned, allowed, report or _nothing)
     return WorkPrecision(net.name, shaft, trials, (exact.source, exact.error), t, _ends(exact.values))
+
+
+def affordable_end(net: Network, shaft: str, t_end: float) -> float:
+    """The end of a motion over which models of a shaft can be compared, s.
+
+    It is the one that is given where a coarse model comes to it before its run would be given up. Else it is a part of
+    the time that this model comes to, since finer ones take longer, and the truth is finer still.
+    """
+    model = with_model(net, shaft, COARSE).compile()
+    began, reached = time.thread_time(), 0.0
+
+    def watch(t: float) -> None:
+        nonlocal reached
+        if time.thread_time() - began > LONGEST:
+            raise SimulationError(f"given up after {LONGEST:g} s")
+        reached = t
+
+    try:
+        model.simulate(t_end, progress=watch)
+    except SimulationError:
+        return float(f"{reached / FINER_COSTS:.1g}") or t_end
+    return t_end
 
 
 def _nothing(_: object) -> None:
@@ -98,13 +134,14 @@ def _nothing(_: object) -> None:
 
 @dataclass(frozen=True, eq=False)
 class _Motion:
-    """The motion of a shaft that all models are compared on, and how it truly is."""
+    """The motion that all models are compared on, the true one of its shaft, and true natural frequencies in Hz."""
 
     net: Network
     shaft: str
     t_end: float
     t: Array
-    exact: Truth
+    exact: ShaftMotion
+    frequencies: Array
 
 
 def _tried(
@@ -132,7 +169,7 @@ def _tried(
 def _too_slow(plan: Trial, trials: Iterable[Trial]) -> str:
     """Why a model is left out: a smaller one of its kind has taken too long already. Empty where it is not."""
     for trial in trials:
-        if trial.line == plan.line and trial.spent > SLOW:
+        if trial.line == plan.line and trial.spent > LONGEST / 2:
             return f"not tried, since {trial.model} took {trial.spent:.0f} s"
     return ""
 
@@ -151,16 +188,17 @@ def _trial(motion: _Motion, model: ShaftModel, plan: Trial) -> Trial:
         if compiled.form.waves:
             _bearable(compiled, shaft, plan, motion.t_end)
         solution, first = _timed(compiled, shaft, plan, motion.t_end, motion.t)
-        times = [first] if built + first > SLOW else []
+        times = [first] if built + first > LONGEST / 2 else []
         while not times or (len(times) < CALLS and sum(times) < 1.0):
             times.append(_timed(compiled, shaft, plan, motion.t_end, motion.t)[1])
     except ShaftworkError as error:
         return dataclasses.replace(plan, setup=time.thread_time() - began, why=in_one_line(error))
     values, cpu = quantities(solution, varied, shaft), median(times)
-    errors = {name: float(np.abs(values[name] - exact.values[name]).max()) / _size(exact, name) for name in QUANTITIES}
+    gaps = {name: float(np.abs(values[name] - exact.values[name]).max()) for name in QUANTITIES}
+    errors = {name: max(gap / _size(exact, name), exact.error) for name, gap in gaps.items()}
     extra = None
-    if exact.frequencies.size and (present := _frequencies(varied, compiled, exact.frequencies)).size:
-        judged, limit = exact.frequencies[:MODES], float(exact.frequencies[MODES - 1 : MODES + 1].mean())
+    if motion.frequencies.size and (present := _frequencies(varied, compiled, motion.frequencies)).size:
+        judged, limit = motion.frequencies[:MODES], float(motion.frequencies[MODES - 1 : MODES + 1].mean())
         errors |= {f"f_{k + 2}": float(np.abs(present / f - 1).min()) for k, f in enumerate(judged)}
         extra = int((present < limit).sum()) - MODES
     return dataclasses.replace(
@@ -202,7 +240,7 @@ def _timed(compiled: Model, shaft: str, plan: Trial, t_end: float, t: Array) -> 
     return solution, time.thread_time() - began
 
 
-def _size(exact: Truth, name: str) -> float:
+def _size(exact: ShaftMotion, name: str) -> float:
     """The largest value, of all torques or all speeds together, so that no quantity is judged by its own zero."""
     kind = name.partition("_")[0]
     family = [value for other, value in exact.values.items() if other.startswith(kind)]

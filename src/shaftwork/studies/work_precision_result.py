@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import dataclasses
 import itertools
 import textwrap
@@ -13,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from shaftwork.core.errors import MissingExtraError
-from shaftwork.core.files import replaced
+from shaftwork.core.files import write_rows
 from shaftwork.core.screen import in_columns
 from shaftwork.results.observer import Array
+from shaftwork.results.plotting import new_figure
 from shaftwork.studies.study_arguments import LADDER, family_of, text_of
 
 if TYPE_CHECKING:
@@ -42,7 +41,8 @@ class Trial:
         states: number of states.
         setup: CPU time from the network to the first result, less a warm call, s; of a trial that failed, all of it.
         cpu: CPU time of a warm call with reading both end torques, s; the median of several.
-        errors: largest error of each quantity over its largest value, by name; of frequencies, relative to each.
+        errors: largest error of each quantity over its largest value, by name, and no less than that of the truth; of
+            frequencies, relative to each.
         extra_modes: oscillating modes, up to halfway between the highest frequency that is judged and the next, less
             those of the exact shaft: spurious ones, or missing ones where negative; None where unknown.
         why: why it failed or was not tried; empty where it was.
@@ -151,15 +151,14 @@ class WorkPrecision:
 
     def to_csv(self, path: str | Path) -> None:
         """Write every trial with all its errors."""
-        with replaced(path) as file:
-            writer = csv.writer(file)
-            first = ["model", "engine", "rtol", "states", "setup_s", "cpu_s"]
-            writer.writerow([*first, *self.columns, "extra_modes", "why"])
-            for trial in self.trials:
-                errors = [trial.errors.get(name, "") for name in self.columns]
-                last = ("" if trial.extra_modes is None else trial.extra_modes, trial.why)
-                costs = (trial.rtol, trial.states, trial.setup, trial.cpu)
-                writer.writerow([trial.model, trial.engine, *costs, *errors, *last])
+        head = ("model", "engine", "rtol", "states", "setup_s", "cpu_s", *self.columns, "extra_modes", "why")
+        rows = (
+            [trial.model, trial.engine, trial.rtol, trial.states, trial.setup, trial.cpu]
+            + [trial.errors.get(name, "") for name in self.columns]
+            + ["" if trial.extra_modes is None else trial.extra_modes, trial.why]
+            for trial in self.trials
+        )
+        write_rows(path, head, rows)
 
     @property
     def data(self) -> dict[str, Any]:
@@ -203,11 +202,7 @@ def milliseconds(cpu: float) -> str:
 
 def _work_precision_figure(study: WorkPrecision) -> Figure:
     """Two panels: error over CPU time, and error over the number of states; each curve is a kind of model."""
-    try:
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise MissingExtraError("matplotlib", "plot", "WorkPrecision.plot()") from None
-    figure = Figure(figsize=(11, 5.4), layout="constrained")
+    figure = new_figure("WorkPrecision.plot()", 11.0, 5.4)
     axes = figure.subplots(1, 2, sharey=True)
     families: dict[str, list[Trial]] = {}
     for trial in study.trials:
@@ -239,11 +234,7 @@ def _work_precision_figure(study: WorkPrecision) -> Figure:
 
 def _courses_figure(study: WorkPrecision, end: str) -> Figure:
     """Two panels: the torque at an end by the best model of each kind and as it truly is, and the differences."""
-    try:
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise MissingExtraError("matplotlib", "plot", "WorkPrecision.plot_courses()") from None
-    figure = Figure(figsize=(11, 7), layout="constrained")
+    figure = new_figure("WorkPrecision.plot_courses()", 11.0, 7.0)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     column, symbol = ("ab".index(end), rf"$\tau_{end}$")
     true = study.courses[:, column]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import shaftwork as sw
-from shaftwork.studies.exact_shafts.line import Section
+from tests.reference.exact_shafts.line import Section
 from tests.reference.ngspice.cases import Case
 from tests.reference.ngspice.runner import converged
 

@@ -12,7 +12,7 @@ from numpy.polynomial import legendre
 
 from shaftwork.core.errors import ParameterError, SimulationError
 from shaftwork.numerics.polynomials import radau_nodes, to_integrals, to_legendre
-from shaftwork.studies.exact_shafts.line import Array, SectionLine, Side
+from tests.reference.exact_shafts.line import Array, SectionLine, Side
 
 # Delays are multiples of a common step where their ratios are such fractions, up to this relative difference.
 LARGEST_DENOMINATOR = 1000

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.studies.exact_shafts.line import Array, Section, SectionLine, Side
+from tests.reference.exact_shafts.line import Array, Section, SectionLine, Side
 
 Complex = npt.NDArray[np.complex128]
 Drive = Literal["torque", "speed"]

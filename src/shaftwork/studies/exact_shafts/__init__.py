@@ -1,1 +1,0 @@
-"""Torsional shafts with distributed inertia: their description and their exact solutions."""
