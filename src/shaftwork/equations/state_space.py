@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from sympy import Add, Dummy, Expr, ImmutableMatrix, Integer, Symbol, cancel
 
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError, SignalError, no_quantity
 from shaftwork.equations.point_slopes import LawSlopes, Slope
-from shaftwork.equations.rows import NetworkEquations
 from shaftwork.equations.tableau import refuse_waves
 from shaftwork.formulation.explicit_rows import BlockTooLargeError, explicit_rows
 from shaftwork.formulation.form import Names, StateForm
@@ -19,6 +19,9 @@ from shaftwork.formulation.observables import Observables
 from shaftwork.formulation.source_inputs import places_of, source_inputs, with_inputs
 from shaftwork.network.graph import GraphBranch
 from shaftwork.network.kinds import Kind
+
+if TYPE_CHECKING:
+    from shaftwork.equations.records import Equations
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +56,7 @@ class StateSpace:
 
 
 def state_space(
-    equations: NetworkEquations, inputs: str | Sequence[str] | None, outputs: str | Sequence[str] | None
+    equations: Equations, inputs: str | Sequence[str] | None, outputs: str | Sequence[str] | None
 ) -> StateSpace:
     """The matrices.
 
@@ -98,7 +101,7 @@ def _listed(names: str | Sequence[str]) -> tuple[str, ...]:
     return (names,) if isinstance(names, str) else tuple(names)
 
 
-def _near(equations: NetworkEquations, slopes: LawSlopes) -> StateForm:
+def _near(equations: Equations, slopes: LawSlopes) -> StateForm:
     """The form with laws by their slopes, in letters of the network, and sources at zero."""
     quantities, laws = equations.assembly.quantities, dict[int, Expr]()
     for branch in equations.form.graph.branches:

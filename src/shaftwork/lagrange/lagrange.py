@@ -19,7 +19,7 @@ from shaftwork.components.branches import ACROSS, HISTORY, INTEGRAL
 from shaftwork.components.laws import t as TIME
 from shaftwork.equations.assembly import FactoredTerms, Sides, sides, terms_of
 from shaftwork.equations.coordinates import Coordinates, coordinates, is_prescribed
-from shaftwork.equations.rows import NetworkEquations
+from shaftwork.equations.records import Equations
 from shaftwork.equations.second_order import linear_stiffness
 from shaftwork.lagrange.lagrange_equations import Constraint, LagrangeEquations, MotionEquation, Square
 from shaftwork.lagrange.lagrange_print import blocks_of, document
@@ -57,7 +57,7 @@ class Lagrangian(LagrangeEquations):
         return rendered(self.kirchhoff, blocks_of(self, values=False))
 
 
-def lagrangian(equations: NetworkEquations) -> Lagrangian:
+def lagrangian(equations: Equations) -> Lagrangian:
     """Lagrange's equations of the network that Kirchhoff's are given of; of these only the network is read."""
     return _LagrangeWriter(equations).lagrangian()
 
@@ -77,7 +77,7 @@ class GeneralisedTorque(NamedTuple):
 
 
 class _LagrangeWriter:
-    def __init__(self, equations: NetworkEquations) -> None:
+    def __init__(self, equations: Equations) -> None:
         self.equations, self.quantities = equations, equations.assembly.quantities
         self.graph = self.quantities.graph
         self.coordinates = coordinates(self.quantities)

@@ -10,8 +10,9 @@ from typing import NamedTuple
 from sympy import Add, Expr, Rational, Symbol
 
 from shaftwork.equations.assembly import FactoredTerms, rising_first, terms_of, tidy
+from shaftwork.equations.kirchhoff import Row
 from shaftwork.equations.quantities import rate_of
-from shaftwork.equations.rows import NetworkEquations, Row
+from shaftwork.equations.records import Equations
 
 
 class Square(NamedTuple):
@@ -85,7 +86,7 @@ class LagrangeEquations:
         prescribed: speed of every prescribed angle or position.
     """
 
-    kirchhoff: NetworkEquations
+    kirchhoff: Equations
     coordinates: tuple[Symbol, ...]
     inertias: tuple[Square, ...]
     springs: tuple[Square, ...]

@@ -14,7 +14,7 @@ from shaftwork.latex.blocks import Block, Blocks
 from shaftwork.latex.document import in_sections, section
 from shaftwork.latex.nomenclature import nomenclature, unit
 from shaftwork.latex.printing import Line
-from shaftwork.latex.sums import Sums
+from shaftwork.latex.shaft_blocks import Sums
 
 KINETIC, POTENTIAL, LOSS = "E_k", "E_p", r"\mathcal{R}"
 """Letters of the energies, after Abdelkader 2016, (19), and of Rayleigh's function."""

@@ -21,8 +21,8 @@ from sympy import Add, Dummy, Expr, Float, Integer, Poly, Symbol, cancel, expand
 from sympy.core.function import Application
 
 from shaftwork.equations.coordinates import coordinates
+from shaftwork.equations.kirchhoff import Row
 from shaftwork.equations.quantities import rate_of
-from shaftwork.equations.rows import Row
 from shaftwork.formulation.gains import exactly, in_decimals
 from shaftwork.lagrange.lagrange_equations import LagrangeEquations
 from shaftwork.network.graph import GROUND
