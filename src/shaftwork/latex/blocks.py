@@ -15,7 +15,6 @@ from sympy import Add, Expr, Float, Integer, Symbol, preorder_traversal
 from shaftwork.core.domains import ELECTRICAL, ROTATION, TRANSLATION
 from shaftwork.core.errors import CompileError
 from shaftwork.equations.assembly import FactoredTerms, Sides, sides, terms_of, tidy
-from shaftwork.equations.kirchhoff import Eliminated, Row, StateEquation
 from shaftwork.equations.notations import in_letters
 from shaftwork.equations.quantities import ThroughQuantity, rate_of
 from shaftwork.equations.second_order import SecondOrder
@@ -25,6 +24,7 @@ from shaftwork.latex.shaft_blocks import MEANING, WEIGHTS, Sums, lines_of_field,
 from shaftwork.network.kinds import Kind
 
 if TYPE_CHECKING:
+    from shaftwork.equations.kirchhoff import Eliminated, Row, StateEquation
     from shaftwork.equations.records import Equations
 
 AUXILIARY = (r"\sigma", r"\zeta", r"\xi", r"\chi")
