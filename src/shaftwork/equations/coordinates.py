@@ -15,6 +15,7 @@ from sympy.polys.matrices import DomainMatrix
 
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.laws import t as TIME
+from shaftwork.equations.assembly import tidy
 from shaftwork.equations.quantities import Quantities, ThroughQuantity, rate_of
 from shaftwork.formulation.gains import exactly, in_decimals
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch
@@ -81,8 +82,12 @@ class Coordinates:
         return Add(*(term.diff(symbol) * self._rates[symbol] for symbol in moving), term.diff(TIME))
 
     def across(self, plus: int, minus: int) -> Expr:
-        """The position of a node less that of another."""
-        return self.positions[plus] - self.positions[minus]
+        """The position of a node less that of another, each coordinate once with its factor in shortest form."""
+        factors: dict[Symbol, list[Expr]] = {}
+        for term in Add.make_args(self.positions[plus] - self.positions[minus]):
+            for symbol in term.free_symbols & self._rates.keys():  # one: positions are linear
+                factors.setdefault(symbol, []).append(term.coeff(symbol))
+        return Add(*(tidy(symbol * (_shortest(Add(*of)) if len(of) > 1 else of[0])) for symbol, of in factors.items()))
 
     def twist(self, branch: GraphBranch) -> Expr:
         """The position across a branch."""
@@ -240,7 +245,7 @@ def _independent(rows: Mapping[int, Row], parameters: Mapping[str, float]) -> tu
     return tuple(independent)
 
 
-def shortest(ratio: Expr) -> Expr:
+def _shortest(ratio: Expr) -> Expr:
     """A ratio without common factors above and below; decimals are rounded only once."""
     return ratio if ratio.is_Integer else in_decimals(cancel(exactly(ratio)))
 
@@ -254,5 +259,5 @@ def _solved(rows: Sequence[Row], columns: Sequence[int]) -> Iterator[tuple[int, 
     reduced, pivots = DomainMatrix.from_dict_sympy(len(rows), len(columns), entries).to_field().rref()
     for i, row in sorted(reduced.to_dod().items()):
         pivot = columns[pivots[i]]
-        factors = {columns[k]: shortest(-reduced.domain.to_sympy(entry)) for k, entry in row.items()}
+        factors = {columns[k]: _shortest(-reduced.domain.to_sympy(entry)) for k, entry in row.items()}
         yield pivot, {key: factor for key, factor in factors.items() if key != pivot}

@@ -141,10 +141,10 @@ class Blocks:
         yield Block("Equations of motion", lines)
         flows = self.equations.assembly.quantities.flows
         by_symbol = [flow for flow in flows if self.equations.assembly.quantities.through(flow) in form.laws]
-        laws = [line for flow in by_symbol for line in self.law(flow, form.across)]
+        laws = [line for flow in by_symbol for line in self.law(flow, form.at.motion)]
         assembly = self.equations.assembly
         for end, other in assembly.opposite.items():
-            across = assembly.quantities.across(assembly.ends(other)).xreplace(form.across)
+            across = assembly.quantities.across(assembly.ends(other)).xreplace(form.at.motion)
             laws.append(self.writer.line(assembly.law_of_history(end, across)))
         yield Block("where", tuple(laws), r"Angles are counted from the untwisted position.")
 
