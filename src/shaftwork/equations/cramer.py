@@ -11,11 +11,11 @@ from sympy import Expr, Integer, Poly, Rational, Symbol, lcm, prime, sring, toge
 from sympy.combinatorics import Permutation
 
 from shaftwork.equations.point_slopes import exact, fraction
-from shaftwork.equations.tableau import S, Sum, Unknown
+from shaftwork.equations.tableau import INPUT, S, Sum
 
 Polynomial = Any
 """An element of a ring of sympy's sparse polynomials."""
-Numbers = Mapping[Symbol, Rational]
+Numbers = dict[Symbol, Rational]
 """Values of symbols."""
 MOST_TERMS = 5_000
 """Terms of the minors on the way to a determinant; one of more is longer than anyone reads, and takes minutes."""
@@ -29,35 +29,24 @@ class TooManyTermsError(Exception):
     """Polynomials on the way to a determinant grow beyond what is asked for."""
 
 
-def quotient(
-    rows: Mapping[Unknown, Sum], entered: Mapping[Unknown, int], output: tuple[Sum, int], numbers: Numbers | None
-) -> tuple[Polynomial, Polynomial]:
+def quotient(rows: Mapping[Symbol, Sum], read: Sum, numbers: Numbers | None) -> tuple[Polynomial, Polynomial]:
     """A sum of unknowns over the input, as two polynomials of one ring without common factors.
 
     Args:
         rows: those of all unknowns; only those that have to do with what is read are taken.
-        entered: what the input adds to the right sides.
-        output: factors of the unknowns that are read, and what the input itself adds to their sum.
+        read: factors of the unknowns and of the input in what is read.
         numbers: of all symbols but s; None keeps them.
 
     Raises:
         TooManyTermsError: the polynomials on the way are too long.
     """
-    read, direct = output
     rows = _connected(rows, read)
-    columns = {unknown: k for k, unknown in enumerate(rows)}
-    bordered = [
-        {columns[unknown]: entry for unknown, entry in row.items()}
-        | ({len(rows): Integer(entered[key])} if key in entered else {})
-        for key, row in rows.items()
-    ]
-    bordered.append({columns[unknown]: -entry for unknown, entry in read.items()})
-    if direct:
-        bordered[-1][len(rows)] = Integer(direct)
+    columns = {unknown: k for k, unknown in enumerate((*rows, INPUT))}
+    bordered = [{columns[unknown]: entry for unknown, entry in row.items()} for row in (*rows.values(), read)]
     if numbers is None:
         cleared = [_cleared(row) for row in bordered]
     else:
-        cleared = [({k: in_numbers(e, numbers).as_expr() for k, e in row.items()}, Integer(1)) for row in bordered]
+        cleared = [({k: _entry(e, numbers) for k, e in row.items()}, Integer(1)) for row in bordered]
     entries = [entry for row, _ in cleared for entry in row.values()]
     ring, (_, factor, *polynomials) = sring([S, cleared[-1][1], *entries])
     in_order = iter(polynomials)
@@ -67,12 +56,14 @@ def quotient(
     return _reduced(_determinant(matrix, ring.one, most), _determinant(inner, ring.one, most) * factor)
 
 
-def _connected(rows: Mapping[Unknown, Sum], read: Sum) -> Mapping[Unknown, Sum]:
+def _connected(rows: Mapping[Symbol, Sum], read: Sum) -> Mapping[Symbol, Sum]:
     """The rows of the unknowns on which those that are read depend, or which depend on these."""
-    trains: nx.Graph[Unknown] = nx.Graph()
+    trains: nx.Graph[Symbol] = nx.Graph()
     trains.add_nodes_from(rows)
-    trains.add_edges_from((key, other) for key, row in rows.items() for other in row)
-    reached = set[Unknown]().union(*(nx.node_connected_component(trains, unknown) for unknown in read))
+    trains.add_edges_from((key, other) for key, row in rows.items() for other in row if other != INPUT)
+    reached = set[Symbol]().union(
+        *(nx.node_connected_component(trains, unknown) for unknown in read if unknown != INPUT)
+    )
     return {key: row for key, row in rows.items() if key in reached}
 
 
@@ -85,9 +76,15 @@ def _cleared(row: Mapping[int, Expr]) -> tuple[dict[int, Expr], Expr]:
     return {column: (above * (common / below).cancel()).expand() for column, (above, below) in parts.items()}, common
 
 
+def _entry(expression: Expr, numbers: Numbers) -> Expr:
+    """The same as an expression; most are numbers, which need no polynomial."""
+    value = exact(expression).xreplace(numbers)
+    return value if value.is_Rational else in_numbers(value, numbers).as_expr()
+
+
 def in_numbers(expression: Expr, numbers: Numbers) -> Poly:
     """A polynomial in s whose coefficients are fractions."""
-    polynomial = Poly(exact(expression).xreplace(dict(numbers)), S)
+    polynomial = Poly(exact(expression).xreplace(numbers), S)
     return Poly([fraction(coefficient) for coefficient in polynomial.all_coeffs()], S)
 
 

@@ -126,7 +126,7 @@ class PointValues:
         self._point, self._at_rest = _Point(equations, at or {}), at is None
         self._time = {TIME: Rational(time)}
 
-    def with_slopes(self, slopes: Mapping[Symbol, Slope]) -> Mapping[Symbol, Rational]:
+    def with_slopes(self, slopes: Mapping[Symbol, Slope]) -> dict[Symbol, Rational]:
         """The values of parameters, of what is derived from them, and of slopes of laws.
 
         Raises:

@@ -1,172 +1,206 @@
-"""Kirchhoff's equations in the image domain: a row for each unknown, with entries made of s and parameters.
+"""Kirchhoff's equations of small motions in the image domain: a row for each unknown, with entries of s and parameters.
 
     sum of i = 0,   i = s C v,   i = G v,   s i = K v,   i = k v + k_q q + sum of k_r (what the law reads),   s q = v
 
-A law has its slopes at a point, where sources are zero but for inputs. No state is chosen: what couplings make
-dependent, and what turns without inertia, is one more unknown.
+They are the balances, laws and couplings of the network whose laws have their slopes at a point, where sources are zero
+but for inputs. No state is chosen: what couplings make dependent, and what turns without inertia, is one more unknown.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from typing import Literal
+import dataclasses
+from collections.abc import Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING
 
-from sympy import Expr, Integer, Symbol
+from sympy import Add, Dummy, Expr, Integer, Mul, Symbol
 
 from shaftwork.components.base import Signal
-from shaftwork.components.branches import ACROSS, INTEGRAL
+from shaftwork.components.branches import INTEGRAL
 from shaftwork.core.errors import CompileError
 from shaftwork.equations.assembly import Assembly
-from shaftwork.equations.point_slopes import LawSlopes
+from shaftwork.equations.quantities import rate_of
 from shaftwork.formulation.form import StateForm
-from shaftwork.formulation.source_inputs import Place
-from shaftwork.network.controlled import Reading, readings_of
-from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
+from shaftwork.network.graph import GROUND, GraphBranch, GraphPart
 from shaftwork.network.kinds import Kind
+
+if TYPE_CHECKING:
+    from shaftwork.equations.point_slopes import LawSlopes
+    from shaftwork.equations.records import Equations
 
 S = Symbol("s")
 """The variable of the image domain, 1/s."""
-Unknown = tuple[Literal["across", "through", "integral"], int]
-"""What is across a node, passes through a branch, or is the integral of what is across a branch."""
-Sum = Mapping[Unknown, Expr]
-"""Factors of unknowns."""
+INPUT = Dummy("input", real=True)
+"""Stands for the input."""
+Sum = Mapping[Symbol, Expr]
+"""Factors of unknowns, and of the input."""
 
 
-def total(terms: Iterable[tuple[Expr | int, Sum]]) -> Sum:
-    """A sum of multiples."""
-    factors: dict[Unknown, Expr] = {}
-    for factor, row in terms:
-        for unknown, entry in row.items():
-            factors[unknown] = factors.get(unknown, Integer(0)) + factor * entry
-    return {unknown: entry for unknown, entry in factors.items() if entry != 0}
-
-
-def refuse_waves(form: StateForm) -> None:
-    """Refuse a network of which no polynomials and matrices tell the motion.
+def linear_form(equations: Equations, slopes: LawSlopes) -> StateForm:
+    """The state form with laws by their slopes, in letters of the network, and sources at zero.
 
     Raises:
-        CompileError: a shaft is a travelling wave.
+        CompileError: a shaft is a travelling wave: no polynomials and matrices tell its motion.
     """
+    form = equations.form
     if form.waves:
         raise CompileError(
             f"Shaft '{form.graph.part_of(form.waves[0]).name}' is a travelling wave, whose transfer functions are no "
             "rational functions of s. Take model=Spectral(8), or frequency_response for their values."
         )
+    laws: dict[int, Expr] = {}
+    for branch in form.graph.branches:
+        own = equations.assembly.quantities.own_law(branch.index)
+        match branch.template.kind:
+            case Kind.THROUGH_SOURCE:
+                laws[branch.index] = Integer(0)
+            case Kind.LAW | Kind.ACROSS_SOURCE:
+                laws[branch.index] = Add(*(slope * by for by, slope in slopes.of(branch).items()))
+            case Kind.COUPLING:
+                pass
+            case Kind.ACROSS_STORE:  # of one that changes the part that stays; a law has the rest
+                laws[branch.index] = form.law_of(branch.index) if branch.template.printed.has(INTEGRAL) else own
+            case _:
+                laws[branch.index] = own
+    return with_laws(form, laws)
 
 
-@dataclass(frozen=True, eq=False)
+def with_laws(form: StateForm, laws: Mapping[int, Expr]) -> StateForm:
+    """The form with other laws, in symbols of the network."""
+
+    def changed(branch: GraphBranch) -> GraphBranch:
+        law = laws[branch.index]
+        template = dataclasses.replace(branch.template, law=law, printed=law, symbols=())
+        return dataclasses.replace(branch, template=template)
+
+    branches = (changed(branch) if branch.index in laws else branch for branch in form.graph.branches)
+    return dataclasses.replace(form, graph=dataclasses.replace(form.graph, branches=tuple(branches)))
+
+
 class Tableau:
     """The rows, made as they are asked for.
 
     Args:
-        assembly: the equations in the time domain.
-        slopes: of their laws.
+        form: the linear form, with the input as the law of a source.
     """
 
-    assembly: Assembly
-    slopes: LawSlopes
+    def __init__(self, form: StateForm) -> None:
+        self._graph, self._assembly, self._redundant = form.graph, Assembly(form), form.tree.redundant
+        self._quantities = quantities = self._assembly.quantities
+        self._nodes = {quantities.node(number): number for number in range(len(form.graph.nodes))}
+        self._integrals = {quantities.integral(k): k for part in form.graph.integrated for k in part}
+        self._branches = {symbol: branch for branch in form.graph.branches if (symbol := self._unknown(branch))}
 
-    @property
-    def _graph(self) -> CircuitGraph:
-        return self.assembly.form.graph
+    def _unknown(self, branch: GraphBranch) -> Symbol | None:
+        """What passes through a branch, where no law gives it by what is across."""
+        match branch.template.kind:
+            case Kind.THROUGH_STORE:
+                return self._quantities.store(branch.index)
+            case Kind.ACROSS_SOURCE:
+                return self._quantities.through(self._quantities.flow_of[branch.index])
+            case Kind.COUPLING:
+                return self._quantities.multiplier(branch.index)
+        return None
 
-    def rows(self, read: Sum) -> dict[Unknown, Sum]:
+    def rows(self, read: Sum) -> dict[Symbol, Sum]:
         """As many rows as unknowns, each by the one that it is the row of; with what a sum contains among them."""
-        rows: dict[Unknown, Sum] = {("across", node): self._balance(node) for node in range(len(self._graph.nodes))}
+        rows = {symbol: self.sum(Add(*self._leaving[number])) for symbol, number in self._nodes.items()}
         unknowns = [unknown for row in (*rows.values(), read) for unknown in row]
-        while missing := [unknown for unknown in dict.fromkeys(unknowns) if unknown not in rows]:
-            added = {unknown: self._imposed(*unknown) for unknown in missing}
+        while missing := [unknown for unknown in dict.fromkeys(unknowns) if unknown not in rows and unknown != INPUT]:
+            added = {unknown: self.sum(self._imposed(unknown)) for unknown in missing}
             rows |= added
             unknowns = [unknown for row in added.values() for unknown in row]
         return rows
 
-    def entered(self, place: Place) -> dict[Unknown, int]:
-        """What an input adds to the right sides of the rows."""
-        if place.branch >= 0:
-            return {("through", place.branch): place.signal.sign}
-        part = self._graph.parts[place.part]
-        plus, minus = map(part.node_at, place.signal.ends)
-        pairs = ((plus, -place.signal.sign), (minus, place.signal.sign))
-        return {("across", node): sign for node, sign in pairs if node != GROUND}
+    def sum(self, expression: Expr) -> Sum:
+        """A linear expression in quantities and their rates, as factors of the unknowns and the input."""
+        factors: dict[Symbol, list[Expr]] = {}
+        terms = [(Integer(1), expression.xreplace(self._in_unknowns))]
+        while terms:  # sympy would differentiate by the product rule
+            factor, term = terms.pop()
+            if term.is_Add:
+                terms += ((factor, part) for part in reversed(term.args))
+            elif term.is_Mul:
+                moving = next(part for part in term.args if any(map(self._moves, part.free_symbols)))
+                terms.append((Mul(factor, *(part for part in term.args if part is not moving)), moving))
+            elif term != 0:
+                factors.setdefault(term, []).append(factor)
+        summed = {symbol: Add(*of) for symbol, of in factors.items()}
+        return {symbol: factor for symbol, factor in summed.items() if factor != 0}
 
-    def signal(self, part: GraphPart, signal: Signal) -> Sum:
-        """A quantity of a part; of a torque without what an input adds to it."""
+    def _moves(self, symbol: Symbol) -> bool:
+        return symbol in self._nodes or symbol in self._branches or symbol in self._integrals or symbol == INPUT
+
+    @cached_property
+    def _in_unknowns(self) -> dict[Expr, Expr]:
+        """Differences of speeds by those of nodes, and rates by s times what they are rates of."""
+        pairs = {p.symbol: self.node(a) - self.node(b) for (a, b), p in self._quantities.pairs.items()}
+        moving = (*self._nodes, *self._branches, *self._integrals)
+        return pairs | {rate_of(symbol): S * pairs.get(symbol, symbol) for symbol in (*moving, *pairs)}
+
+    def node(self, number: int) -> Expr:
+        """What is across a node and the reference."""
+        return self._quantities.node(number)
+
+    def integral(self, branch: int) -> Expr:
+        """The integral of what is across a branch, one more unknown where no law reads it."""
+        symbol = self._quantities.integral(branch)
+        self._integrals.setdefault(symbol, branch)
+        return symbol
+
+    def signal(self, part: GraphPart, signal: Signal) -> Expr:
+        """A quantity of a part."""
         if signal.kind == "across":
             plus, minus = map(part.node_at, signal.ends)
-            return total([(signal.sign, self.node(plus)), (-signal.sign, self.node(minus))])
-        branches = [self._graph.branches[index] for index in part.branches]
+            return signal.sign * (self.node(plus) - self.node(minus))
+        branches = [branch for branch in self._graph.branches if self._graph.parts[branch.part].name == part.name]
         if signal.kind == "through":
-            return total(
-                (signal.sign * sign * self._graph.in_network_symbols(factor, branch), self.through(branch))
-                for branch in branches
-                for factor, *ends in branch.template.balances or ((Integer(1), *branch.template.ends),)
-                for end, sign in zip(ends, (1, -1), strict=True)
-                if end == signal.ends[0]
+            return Add(
+                *(
+                    signal.sign * sign * self._graph.in_network_symbols(factor, branch) * self._carried(branch)
+                    for branch in branches
+                    for factor, *ends in branch.template.balances or ((Integer(1), *branch.template.ends),)
+                    for end, sign in zip(ends, (1, -1), strict=True)
+                    if end == signal.ends[0]
+                )
             )
         stores = (branch for branch in branches if branch.template.kind is Kind.THROUGH_STORE)
-        store = next(branch for branch in stores if signal.label in ("", branch.template.label))
-        factor = 1 / self.assembly.quantities.law(store.index) if signal.kind == "twist" else Integer(signal.sign)
-        return total([(factor, self.through(store))])
+        store = next(branch for branch in stores if signal.label in ("", branch.template.label)).index
+        factor = 1 / self._quantities.law(store) if signal.kind == "twist" else Integer(signal.sign)
+        return factor * self._quantities.store(store)
 
-    def node(self, number: int) -> Sum:
-        """What is across a node and the reference."""
-        return {} if number == GROUND else {("across", number): Integer(1)}
-
-    def across(self, branch: GraphBranch) -> Sum:
-        """What is across a branch."""
-        return total([(1, self.node(branch.plus)), (-1, self.node(branch.minus))])
-
-    def integral(self, branch: GraphBranch) -> Sum:
-        """The integral of what is across a branch."""
-        return {("integral", branch.index): Integer(1)}
-
-    def through(self, branch: GraphBranch) -> Sum:
+    def _carried(self, branch: GraphBranch) -> Expr:
         """What passes through a branch."""
-        index = branch.index
-        match branch.template.kind:
-            case Kind.ACROSS_STORE:
-                constant = self._graph.in_network_symbols(branch.template.law, branch)
-                return total([(S * constant, self.across(branch))])
-            case Kind.CONDUCTANCE:
-                return total([(self.assembly.quantities.law(index), self.across(branch))])
-            case Kind.LAW:
-                return self._near(branch)
-            case Kind.THROUGH_SOURCE:
-                return {}
-        # a coupling that says what others have said carries nothing
-        return {} if index in self.assembly.form.tree.redundant else {("through", index): Integer(1)}
+        if branch.index in self._redundant:  # it says what other couplings have said
+            return Integer(0)
+        if branch.template.kind is Kind.ACROSS_STORE:
+            return self._quantities.law(branch.index) * self._quantities.rate(branch.index)
+        return self._unknown(branch) or self._assembly.through_law(branch.index)
 
-    def _balance(self, node: int) -> Sum:
-        """What leaves a node."""
-        pairs = ((branch, self.assembly.incidence(branch.index, node)) for branch in self._graph.branches)
-        return total((factor, self.through(branch)) for branch, factors in pairs for factor in factors)
+    @cached_property
+    def _leaving(self) -> tuple[list[Expr], ...]:
+        """What leaves each node through the branches."""
+        leaving = tuple(list[Expr]() for _ in self._nodes)
+        for branch in self._graph.branches:
+            carried, ends = self._carried(branch), branch.balances or ((Integer(1), branch.plus, branch.minus),)
+            for coefficient, *nodes in ends:
+                factor = self._graph.in_network_symbols(coefficient, branch)
+                for node, sign in zip(nodes, (1, -1), strict=True):
+                    if node != GROUND:
+                        leaving[node].append(sign * factor * carried)
+        return leaving
 
-    def _imposed(self, kind: str, index: int) -> Sum:
-        """The row of an unknown at a branch."""
-        branch = self._graph.branches[index]
-        if kind == "integral":
-            return total([(S, self.integral(branch)), (-1, self.across(branch))])
+    def _imposed(self, unknown: Symbol) -> Expr:
+        """The row of an integral, or of what passes through a branch: what its law says less what is so."""
+        if unknown in self._integrals:
+            plus, minus = self._assembly.ends(self._integrals[unknown])
+            return rate_of(unknown) - self._quantities.across((plus, minus))
+        branch = self._branches[unknown]
         match branch.template.kind:
             case Kind.THROUGH_STORE:
-                return total([(S, self.through(branch)), (-self.assembly.quantities.law(index), self.across(branch))])
+                law = self._assembly.law_of_store(branch.index)
             case Kind.ACROSS_SOURCE:
-                return total([(1, self.across(branch)), (-1, self._near(branch))])
-        placed = ((self._graph.in_network_symbols(factor, branch), ends) for factor, *ends in branch.terms)
-        return total(pair for f, (a, b) in placed for pair in ((f, self.node(a)), (-f, self.node(b))))
-
-    def _near(self, branch: GraphBranch) -> Sum:
-        """A law near a point: its slopes times what it reads."""
-        at_branch = {ACROSS: self.across, INTEGRAL: self.integral}
-        reads = readings_of(self._graph, branch.index)
-        slopes = self.slopes.of(branch).items()
-        read = ((slope, at_branch[by](branch) if by in at_branch else self._value(reads[by])) for by, slope in slopes)
-        return total(read)
-
-    def _value(self, reading: Reading) -> Sum:
-        if reading.kind == "across":
-            return self.node(reading.of)
-        branch = self._graph.branches[reading.of]
-        if reading.kind == "rate":
-            return total([(S, self.across(branch))])
-        return self.through(branch) if reading.kind == "through" else self.integral(branch)
+                law = self._assembly.law_of_source(branch.index)
+            case _:
+                law = self._assembly.coupling(branch.index)
+        return law.left - Add(*(factor * Add(*terms) for factor, terms in law.groups))

@@ -19,10 +19,10 @@ from sympy import Add, Expr, Float, Integer, Poly, Rational, Symbol
 from shaftwork.core.errors import CompileError, ParameterError, SignalError, no_quantity
 from shaftwork.equations.cramer import TooManyTermsError, in_numbers, quotient
 from shaftwork.equations.point_slopes import FRACTION_DIGITS, LawSlopes, PointValues, Slope, Values
-from shaftwork.equations.tableau import S, Sum, Tableau, refuse_waves
+from shaftwork.equations.tableau import INPUT, S, Tableau, linear_form, with_laws
 from shaftwork.formulation.form import Names
 from shaftwork.formulation.gains import LONGEST
-from shaftwork.formulation.source_inputs import Place, places_of
+from shaftwork.formulation.source_inputs import places_of, with_inputs
 
 if TYPE_CHECKING:
     from shaftwork.equations.records import Equations
@@ -173,17 +173,18 @@ def transfer_function(
         CompileError: a shaft is a travelling wave; the network is too large for symbols; or it has several motions.
         ParameterError: with values, `at` names no quantity, or a law has no finite slope there.
     """
-    refuse_waves(equations.form)
     if not values and (at is not None or t is not None):
         raise ParameterError("at and t put numbers in. Take values=True, or numeric(at=...) of what this makes.")
-    (place,) = places_of(equations.form.graph, names[:1])
     slopes = LawSlopes(equations.assembly.quantities)
-    tableau = Tableau(equations.assembly, slopes)
-    read, direct = _output(equations, tableau, place, names[1])
+    linear = linear_form(equations, slopes)
+    places = places_of(equations.form.graph, names[:1])
+    form, (branch,) = with_inputs(linear, places)
+    tableau = Tableau(with_laws(form, {branch: places[0].signal.sign * INPUT}))
+    read = tableau.sum(_output(equations, tableau, names[1]))
     rows = tableau.rows(read)
     numbers = PointValues(equations, None, at, t).with_slopes(slopes.letters) if values else None
     try:
-        above, below = quotient(rows, tableau.entered(place), (read, direct), numbers)
+        above, below = quotient(rows, read, numbers)
     except TooManyTermsError:
         raise CompileError(
             "The network has too many loops for determinants in numbers. Take frequency_response."
@@ -201,27 +202,22 @@ def transfer_function(
     return TransferFunction(*names, Poly(above.as_expr(), S), Poly(below.as_expr(), S), standing, equations)
 
 
-def _output(equations: Equations, tableau: Tableau, place: Place, name: str) -> tuple[Sum, int]:
-    """A quantity as a sum of unknowns, and what the input itself adds to it.
+def _output(equations: Equations, tableau: Tableau, name: str) -> Expr:
+    """A quantity in unknowns.
 
     Raises:
         SignalError: there is no such quantity, or it is a power or an energy.
     """
-    names, graph = Names(equations.form), equations.form.graph
+    names, states = Names(equations.form), equations.form.states
     if name in names.signals:
-        part, signal = names.signals[name]
-        direct = 0
-        if signal.kind == "through" and place.branch < 0 and part.name == graph.parts[place.part].name:
-            first, second = place.signal.ends
-            direct = signal.sign * place.signal.sign * ((first == signal.ends[0]) - (second == signal.ends[0]))
-        return tableau.signal(part, signal), direct
+        return tableau.signal(*names.signals[name])
     if name in names.integrals:
-        return tableau.integral(graph.branches[equations.form.states[names.integrals[name]].branch]), 0
+        return tableau.integral(states[names.integrals[name]].branch)
     if name in names.nodes:
-        return tableau.node(names.nodes[name]), 0
+        return tableau.node(names.nodes[name])
     if name in names.units:
         raise SignalError(f"'{name}' is a product of speeds and torques: it has no transfer function.")
-    raise no_quantity(name, graph.name, names.units)
+    raise no_quantity(name, equations.form.graph.name, names.units)
 
 
 def _divided(above: Poly, below: Poly, s: complex) -> complex:
