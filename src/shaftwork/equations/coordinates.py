@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from sympy import Add, Expr, Float, Integer, Mul, Symbol, cancel
+from sympy import Add, Expr, Float, Integer, Symbol, cancel
 from sympy.polys.matrices import DomainMatrix
 
 from shaftwork.components.branches import ACROSS, INTEGRAL
@@ -69,17 +69,14 @@ class Coordinates:
         return {**dict(first), **self.prescribed}
 
     def rate(self, expression: Expr) -> Expr:
-        """The time derivative, by the chain rule."""
-        return Add(*map(self._rate_of, Add.make_args(expression)))
-
-    def _rate_of(self, term: Expr) -> Expr:
-        moving = [symbol for symbol in term.free_symbols if symbol in self._rates]
-        if len(moving) == 1 and moving[0] in Mul.make_args(term) and TIME not in term.free_symbols:
-            # what is linear has the rate in place of the position; sympy would go through the product rule
-            constant = Mul(*(factor for factor in Mul.make_args(term) if factor != moving[0]))
-            if moving[0] not in constant.free_symbols:
-                return constant * self._rates[moving[0]]
-        return Add(*(term.diff(symbol) * self._rates[symbol] for symbol in moving), term.diff(TIME))
+        """The time derivative of a sum of functions of time and of what is linear in coordinates and their rates."""
+        moving = self._rates.keys()
+        return Add(
+            *(
+                term.diff(TIME) if moving.isdisjoint(term.free_symbols) else term.xreplace(self._rates)
+                for term in Add.make_args(expression)
+            )
+        )
 
     def across(self, plus: int, minus: int) -> Expr:
         """The position of a node less that of another, each coordinate once with its factor in shortest form."""

@@ -22,8 +22,8 @@ from shaftwork.formulation.form import StateForm, branch_name
 if TYPE_CHECKING:
     from shaftwork.equations.fields import Field
     from shaftwork.equations.kirchhoff import Eliminated, LoopEquation, NodeEquation, Row, StateEquation
-    from shaftwork.equations.state_space import StateSpace
-    from shaftwork.equations.transfer import TransferFunction
+    from shaftwork.equations.small_motions.state_space import StateSpace
+    from shaftwork.equations.small_motions.transfer import TransferFunction
     from shaftwork.latex.document import Form
 
 SHOWN = 5
@@ -242,7 +242,7 @@ class Equations:
             CompileError: a shaft is a travelling wave, or the polynomials would be too long in symbols.
             ParameterError: `at` names no quantity, or a law has no finite slope there.
         """
-        from shaftwork.equations.transfer import transfer_function
+        from shaftwork.equations.small_motions.transfer import transfer_function
 
         return transfer_function(self, (input, output), values=values, at=at, t=t)
 
@@ -259,7 +259,7 @@ class Equations:
             SignalError: there is no such input or quantity.
             CompileError: a shaft is a travelling wave, or more rates are coupled than are solved in symbols.
         """
-        from shaftwork.equations.state_space import state_space
+        from shaftwork.equations.small_motions.state_space import state_space
 
         return state_space(self, inputs, outputs)
 

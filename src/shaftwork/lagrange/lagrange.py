@@ -18,10 +18,10 @@ from sympy import Add, Expr, Integer, Symbol, cancel
 from shaftwork.components.branches import ACROSS, HISTORY
 from shaftwork.equations.assembly import FactoredTerms, Sides, sides, terms_of
 from shaftwork.equations.coordinates import Coordinates, coordinates, is_prescribed
-from shaftwork.equations.energies import Energies, GeneralisedTorque, Square
 from shaftwork.equations.kirchhoff import Row
 from shaftwork.equations.quantities import rate_of
 from shaftwork.equations.records import Equations
+from shaftwork.equations.second_order import Energies, GeneralisedTorque, Square
 from shaftwork.network.graph import GROUND, GraphBranch
 from shaftwork.network.kinds import Kind
 

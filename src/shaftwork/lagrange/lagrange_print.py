@@ -17,7 +17,7 @@ from shaftwork.latex.printing import Line
 from shaftwork.latex.shaft_blocks import Sums
 
 if TYPE_CHECKING:
-    from shaftwork.equations.energies import Square
+    from shaftwork.equations.second_order import Square
     from shaftwork.lagrange.lagrange import Lagrangian, MotionEquation
 
 KINETIC, POTENTIAL, LOSS = "E_k", "E_p", r"\mathcal{R}"

@@ -9,14 +9,14 @@ from sympy import Add, Expr, Integer, Symbol, default_sort_key
 
 from shaftwork.equations.assembly import FactoredTerms
 from shaftwork.equations.notations import QUANTITIES
+from shaftwork.equations.small_motions.tableau import S
 from shaftwork.equations.spelling import escaped, without_marks
-from shaftwork.equations.tableau import S
 from shaftwork.latex.blocks import Blocks
 from shaftwork.latex.printing import LINE_WIDTH, Line, Writer, aligned, printed_width
 
 if TYPE_CHECKING:
-    from shaftwork.equations.point_slopes import Slope
-    from shaftwork.equations.transfer import TransferFunction
+    from shaftwork.equations.small_motions.point_slopes import Slope
+    from shaftwork.equations.small_motions.transfer import TransferFunction
 
 REAL = Symbol("s", real=True)
 """Stands for s in print, where all letters are real."""

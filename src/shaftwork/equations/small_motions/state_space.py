@@ -10,8 +10,8 @@ from sympy import Dummy, Expr, ImmutableMatrix, Integer, Symbol, cancel
 
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError, SignalError, no_quantity
-from shaftwork.equations.point_slopes import LawSlopes, Slope
-from shaftwork.equations.tableau import linear_form, with_laws
+from shaftwork.equations.small_motions.point_slopes import LawSlopes, Slope
+from shaftwork.equations.small_motions.tableau import linear_form, with_laws
 from shaftwork.formulation.explicit_rows import BlockTooLargeError, explicit_rows
 from shaftwork.formulation.form import Names, StateForm
 from shaftwork.formulation.observables import Observables

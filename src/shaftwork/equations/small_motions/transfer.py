@@ -5,21 +5,29 @@ They are quotients of two determinants of the tableau, by Cramer's rule; compute
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from mpmath import mpf, polyroots, workdps
 from numpy.typing import NDArray
-from sympy import Add, Expr, Float, Integer, Poly, Rational, Symbol
+from sympy import QQ, QQ_I, Add, Expr, Float, Integer, Poly, Rational, Symbol
+from sympy.polys.densetools import dup_eval
 
 from shaftwork.core.errors import CompileError, ParameterError, SignalError, no_quantity
-from shaftwork.equations.cramer import TooManyTermsError, in_numbers, quotient
-from shaftwork.equations.point_slopes import FRACTION_DIGITS, LawSlopes, PointValues, Slope, Values
-from shaftwork.equations.tableau import INPUT, S, Tableau, linear_form, with_laws
+from shaftwork.equations.small_motions.point_slopes import FRACTION_DIGITS, LawSlopes, PointValues, Slope, Values
+from shaftwork.equations.small_motions.tableau import (
+    INPUT,
+    S,
+    Tableau,
+    TooManyTermsError,
+    in_numbers,
+    linear_form,
+    quotient,
+    with_laws,
+)
 from shaftwork.formulation.form import Names
 from shaftwork.formulation.gains import LONGEST
 from shaftwork.formulation.source_inputs import places_of, with_inputs
@@ -222,19 +230,15 @@ def _output(equations: Equations, tableau: Tableau, name: str) -> Expr:
 
 def _divided(above: Poly, below: Poly, s: complex) -> complex:
     """A quotient at a complex number: exact but for the last division."""
-    (a, b), (c, d) = (_at(polynomial.all_coeffs(), s) for polynomial in (above, below))
-    size = c * c + d * d
-    if not size:
+    at = QQ_I(*(QQ(*part.as_integer_ratio()) for part in (s.real, s.imag)))
+    numerator, denominator = (
+        dup_eval([QQ_I(QQ(int(c.p), int(c.q)), 0) for c in polynomial.all_coeffs()], at, QQ_I)
+        for polynomial in (above, below)
+    )
+    if not denominator:
         raise ParameterError(f"s = {s:g} is a pole.")
-    return complex(float((a * c + b * d) / size), float((b * c - a * d) / size))
-
-
-def _at(coefficients: Iterable[Rational], s: complex) -> tuple[Fraction, Fraction]:
-    real, imaginary = Fraction(s.real), Fraction(s.imag)
-    x, y = Fraction(0), Fraction(0)
-    for c in coefficients:
-        x, y = x * real - y * imaginary + Fraction(int(c.p), int(c.q)), x * imaginary + y * real
-    return x, y
+    quotient = numerator / denominator
+    return complex(float(quotient.x), float(quotient.y))
 
 
 def _roots(polynomial: Poly) -> Complex:
