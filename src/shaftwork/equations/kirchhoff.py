@@ -234,18 +234,12 @@ class _KirchhoffWriter:
                 yield Row(*self.origin((branch.index,)), partial(self.assembly.coupling, branch.index))
 
     def states(self) -> Iterator[StateEquation]:
-        systems = {"across": self._speeds, "through": self._torques}
+        systems = {"across": lambda: self.solution.speeds, "through": lambda: self.solution.torques}
         for state in self.form.states:
             branch, system = state.branch, systems.get(state.kind)
             make = partial(_row, system, branch) if system else partial(self._integral_row, branch)
             symbol = Symbol(state.name, real=True)
             yield StateEquation(*self.origin((branch,)), make, state.name, symbol, state.unit, system)
-
-    def _speeds(self) -> EliminationSystem:
-        return self.solution.speeds
-
-    def _torques(self) -> EliminationSystem:
-        return self.solution.torques
 
     def _integral_row(self, branch: int) -> Sides:
         link = branch in self.form.tree.loops
@@ -255,7 +249,7 @@ class _KirchhoffWriter:
     def eliminated(self) -> Iterator[Eliminated]:
         yield from self._dependent_speeds()
         for branch in self.form.dependent_through:
-            make = partial(self._carried, self.assembly.quantities.store, branch)
+            make = partial(self._carried, branch)
             name = branch_name(self.graph, self.graph.branches[branch])
             yield Eliminated(*self._cutset(branch), make, name, self._series(branch), "torque")
         for branch in self.form.tree_conductances:
@@ -310,27 +304,21 @@ class _KirchhoffWriter:
 
     def _reactions(self) -> Iterator[Eliminated]:
         for branch in self.form.tree.tree[Kind.COUPLING]:
-            sign = self.assembly.quantities.multiplier_sign(branch)
-            make = partial(self._carried, self.assembly.quantities.multiplier, branch, sign)
+            make = partial(self._carried, branch)
             ideal = "" if self.graph.branches[branch].template.through else "is ideal: it "
             why = f"{self.part(branch)} {ideal}takes whatever the balance asks"
             yield Eliminated(*self._cutset(branch), make, f"reaction of {self.part(branch)}", why, "reaction")
         for branch in self.form.across_sources:
             why = f"{self.part(branch)} supplies whatever its prescribed value takes"
-            make = partial(self._supplied, branch)
+            make = partial(self._carried, branch)
             yield Eliminated(*self._cutset(branch), make, f"reaction of {self.part(branch)}", why, "reaction")
 
     def _cutset(self, branch: int) -> Origin:
         return self.origin((branch, *(link for link, _ in self.assembly.cutsets.get(branch, ()))))
 
-    def _carried(self, symbol: Callable[[int], Expr], branch: int, sign: int = 1) -> Sides:
-        return sides(symbol(branch), (sign * term for term in self.assembly.out_of(branch)))
-
-    def _supplied(self, branch: int) -> Sides:
-        flow = self.assembly.quantities.flow_of[branch]
-        return sides(
-            self.assembly.quantities.through(flow), (flow.sign * term for term in self.assembly.out_of(branch))
-        )
+    def _carried(self, branch: int) -> Sides:
+        symbol, sign = self.assembly.quantities.passing(branch)
+        return sides(symbol, (sign * term for term in self.assembly.out_of(branch)))
 
     def _series(self, branch: int) -> str:
         members = [link for link, _ in self.assembly.cutsets.get(branch, ())]

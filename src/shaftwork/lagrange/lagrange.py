@@ -189,7 +189,7 @@ class _LagrangeWriter:
             tuple(energies.dampers),
             equations,
             tuple(self.constraints),
-            tuple(map(self._reaction, self.coordinates.imposed)),
+            tuple(self.quantities.passing(branch)[0] for branch in self.coordinates.imposed),
             energies.laws,
             {**self.coordinates.of_flows(flows), **self.coordinates.motion},
             self.coordinates.prescribed,
@@ -199,23 +199,16 @@ class _LagrangeWriter:
     def _accelerations(self) -> frozenset[Symbol]:
         return frozenset(self.coordinates.accelerations)
 
-    def _reaction(self, branch: int) -> Symbol:
-        """What a coupling or prescribed speed gives."""
-        if self.graph.branches[branch].terms:
-            return self.quantities.multiplier(branch)
-        return self.quantities.through(self.quantities.flow_of[branch])
-
     def _enter_constraint(self, branch: GraphBranch) -> None:
         """Put down what a controlled source or a coupling with losses imposes, and the torque that does so."""
-        reaction, at = self._reaction(branch.index), self.coordinates
+        (reaction, sign), at = self.quantities.passing(branch.index), self.coordinates
         if branch.terms:
             left, right = at.rate(at.summed(branch, branch.terms)), Integer(0)
-            torque = GeneralisedTorque(branch.index, reaction, at.summed(branch, branch.balances))
+            along = at.summed(branch, branch.balances)
         else:
             left, right = at.speed(branch), at.of(self.quantities.law(branch.index))
-            sign = self.quantities.flow_of[branch.index].sign
-            torque = GeneralisedTorque(branch.index, sign * reaction, at.twist(branch))
-        self.energies.torques.append(torque)
+            along = at.twist(branch)
+        self.energies.torques.append(GeneralisedTorque(branch.index, sign * reaction, along))
         pairs = branch.terms or ((Integer(1), branch.plus, branch.minus),)
         nodes = dict.fromkeys(node for _, *ends in pairs for node in ends if node != GROUND)
         names, part = tuple(self.graph.nodes[node] for node in nodes), self.graph.part_of(branch.index).name

@@ -39,6 +39,8 @@ INPUT = Dummy("input", real=True)
 """Stands for the input."""
 Sum = Mapping[Symbol, Expr]
 """Factors of unknowns, and of the input."""
+CARRYING = (Kind.THROUGH_STORE, Kind.ACROSS_SOURCE, Kind.COUPLING)
+"""Branches through which passes one more unknown, which no law gives by what is across."""
 Polynomial = Any
 """An element of a ring of sympy's sparse polynomials."""
 Numbers = dict[Symbol, Rational]
@@ -101,21 +103,11 @@ class Tableau:
 
     def __init__(self, form: StateForm) -> None:
         self._graph, self._assembly, self._redundant = form.graph, Assembly(form), form.tree.redundant
-        self._quantities = quantities = self._assembly.quantities
+        self.quantities = quantities = self._assembly.quantities
         self._nodes = {quantities.node(number): number for number in range(len(form.graph.nodes))}
         self._integrals = {quantities.integral(k): k for part in form.graph.integrated for k in part}
-        self._branches = {symbol: branch for branch in form.graph.branches if (symbol := self._unknown(branch))}
-
-    def _unknown(self, branch: GraphBranch) -> Symbol | None:
-        """What passes through a branch, where no law gives it by what is across."""
-        match branch.template.kind:
-            case Kind.THROUGH_STORE:
-                return self._quantities.store(branch.index)
-            case Kind.ACROSS_SOURCE:
-                return self._quantities.through(self._quantities.flow_of[branch.index])
-            case Kind.COUPLING:
-                return self._quantities.multiplier(branch.index)
-        return None
+        carrying = [k for k, branch in enumerate(form.graph.branches) if branch.template.kind in CARRYING]
+        self._branches = {quantities.passing(k)[0]: k for k in carrying}
 
     def rows(self, read: Sum) -> dict[Symbol, Sum]:
         """As many rows as unknowns, each by the one that it is the row of; with what a sum contains among them."""
@@ -149,17 +141,15 @@ class Tableau:
     @cached_property
     def _in_unknowns(self) -> dict[Expr, Expr]:
         """Differences of speeds by those of nodes, and rates by s times what they are rates of."""
-        pairs = {p.symbol: self.node(a) - self.node(b) for (a, b), p in self._quantities.pairs.items()}
+        pairs = {
+            p.symbol: self.quantities.node(a) - self.quantities.node(b) for (a, b), p in self.quantities.pairs.items()
+        }
         moving = (*self._nodes, *self._branches, *self._integrals)
         return pairs | {rate_of(symbol): S * pairs.get(symbol, symbol) for symbol in (*moving, *pairs)}
 
-    def node(self, number: int) -> Expr:
-        """What is across a node and the reference."""
-        return self._quantities.node(number)
-
     def integral(self, branch: int) -> Expr:
         """The integral of what is across a branch, one more unknown where no law reads it."""
-        symbol = self._quantities.integral(branch)
+        symbol = self.quantities.integral(branch)
         self._integrals.setdefault(symbol, branch)
         return symbol
 
@@ -167,7 +157,7 @@ class Tableau:
         """A quantity of a part."""
         if signal.kind == "across":
             plus, minus = map(part.node_at, signal.ends)
-            return signal.sign * (self.node(plus) - self.node(minus))
+            return signal.sign * (self.quantities.node(plus) - self.quantities.node(minus))
         branches = [branch for branch in self._graph.branches if self._graph.parts[branch.part].name == part.name]
         if signal.kind == "through":
             return Add(
@@ -181,16 +171,19 @@ class Tableau:
             )
         stores = (branch for branch in branches if branch.template.kind is Kind.THROUGH_STORE)
         store = next(branch for branch in stores if signal.label in ("", branch.template.label)).index
-        factor = 1 / self._quantities.law(store) if signal.kind == "twist" else Integer(signal.sign)
-        return factor * self._quantities.store(store)
+        factor = 1 / self.quantities.law(store) if signal.kind == "twist" else Integer(signal.sign)
+        return factor * self.quantities.store(store)
 
     def _carried(self, branch: GraphBranch) -> Expr:
         """What passes through a branch."""
         if branch.index in self._redundant:  # it says what other couplings have said
             return Integer(0)
         if branch.template.kind is Kind.ACROSS_STORE:
-            return self._quantities.law(branch.index) * self._quantities.rate(branch.index)
-        return self._unknown(branch) or self._assembly.through_law(branch.index)
+            return self.quantities.law(branch.index) * self.quantities.rate(branch.index)
+        if branch.template.kind in CARRYING:
+            symbol, sign = self.quantities.passing(branch.index)
+            return sign * symbol
+        return self._assembly.through_law(branch.index)
 
     @cached_property
     def _leaving(self) -> tuple[list[Expr], ...]:
@@ -209,15 +202,13 @@ class Tableau:
         """The row of an integral, or of what passes through a branch: what its law says less what is so."""
         if unknown in self._integrals:
             plus, minus = self._assembly.ends(self._integrals[unknown])
-            return rate_of(unknown) - self._quantities.across((plus, minus))
-        branch = self._branches[unknown]
-        match branch.template.kind:
-            case Kind.THROUGH_STORE:
-                law = self._assembly.law_of_store(branch.index)
-            case Kind.ACROSS_SOURCE:
-                law = self._assembly.law_of_source(branch.index)
-            case _:
-                law = self._assembly.coupling(branch.index)
+            return rate_of(unknown) - self.quantities.across((plus, minus))
+        branch, assembly = self._branches[unknown], self._assembly
+        law = {
+            Kind.THROUGH_STORE: assembly.law_of_store,
+            Kind.ACROSS_SOURCE: assembly.law_of_source,
+            Kind.COUPLING: assembly.coupling,
+        }[assembly.kind(branch)](branch)
         return law.left - Add(*(factor * Add(*terms) for factor, terms in law.groups))
 
 

@@ -222,7 +222,7 @@ def _output(equations: Equations, tableau: Tableau, name: str) -> Expr:
     if name in names.integrals:
         return tableau.integral(states[names.integrals[name]].branch)
     if name in names.nodes:
-        return tableau.node(names.nodes[name])
+        return tableau.quantities.node(names.nodes[name])
     if name in names.units:
         raise SignalError(f"'{name}' is a product of speeds and torques: it has no transfer function.")
     raise no_quantity(name, equations.form.graph.name, names.units)
