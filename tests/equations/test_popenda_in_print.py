@@ -14,8 +14,8 @@ import shaftwork as sw
 from shaftwork.components.laws import t
 from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.equations.fields import X
+from shaftwork.equations.kirchhoff import Row
 from shaftwork.equations.notations import NOTATIONS
-from shaftwork.equations.rows import Row
 from shaftwork.scenes import SCENES
 
 STEEL = {"length": 1.0, "diameter": 0.02, "density": 7900.0, "shear_modulus": 77.5e9}

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from shaftwork.components.rotation import Damper, Inertia, Spring
+from shaftwork.equations.spelling import INDEX_CLOSES, INDEX_OPENS
 from shaftwork.latex.printing import Line
 from shaftwork.latex.series import shortened
-from shaftwork.latex.spelling import INDEX_CLOSES, INDEX_OPENS
 from shaftwork.network.builder import NetworkBuilder
 from tests.equations.networks import equations_of
 

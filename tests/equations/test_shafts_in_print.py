@@ -12,7 +12,7 @@ import pytest
 
 import shaftwork as sw
 from shaftwork.equations.records import Equations
-from shaftwork.latex.spelling import without_marks
+from shaftwork.equations.spelling import without_marks
 
 
 def drive(model: object, **shaft: float) -> sw.Network:

@@ -11,7 +11,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import shaftwork as sw
-from shaftwork.equations.state_space import StateSpace
+from shaftwork.equations.small_motions.state_space import StateSpace
 from tests.properties.examples import Array, compiled, network_of, share_of_examples
 from tests.strategies import Network, networks
 

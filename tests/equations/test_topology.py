@@ -8,7 +8,7 @@ import sympy
 from hypothesis import given
 
 import shaftwork as sw
-from shaftwork.equations.topology import NamedMatrix
+from shaftwork.equations.records import NamedMatrix
 from tests.properties.examples import Array, network_of, share_of_examples
 from tests.strategies import Network, networks
 

@@ -135,7 +135,8 @@ class Assembly:
     def stored(self, branch: int) -> Expr:
         """The through variable of an across store or of a coupling."""
         if self.form.graph.branches[branch].terms:
-            return self.quantities.multiplier_sign(branch) * self.quantities.multiplier(branch)
+            symbol, sign = self.quantities.passing(branch)
+            return sign * symbol
         across = self.quantities.across(self.ends(branch))
         sign = -1 if across.could_extract_minus_sign() else 1
         return sign * self.quantities.law(branch) * rate_of(sign * across)

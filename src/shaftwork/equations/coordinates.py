@@ -10,11 +10,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from sympy import Add, Expr, Float, Integer, Mul, Symbol, cancel
+from sympy import Add, Expr, Float, Integer, Symbol, cancel
 from sympy.polys.matrices import DomainMatrix
 
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.laws import t as TIME
+from shaftwork.equations.assembly import tidy
 from shaftwork.equations.quantities import Quantities, ThroughQuantity, rate_of
 from shaftwork.formulation.gains import exactly, in_decimals
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch
@@ -68,21 +69,22 @@ class Coordinates:
         return {**dict(first), **self.prescribed}
 
     def rate(self, expression: Expr) -> Expr:
-        """The time derivative, by the chain rule."""
-        return Add(*map(self._rate_of, Add.make_args(expression)))
-
-    def _rate_of(self, term: Expr) -> Expr:
-        moving = [symbol for symbol in term.free_symbols if symbol in self._rates]
-        if len(moving) == 1 and moving[0] in Mul.make_args(term) and TIME not in term.free_symbols:
-            # what is linear has the rate in place of the position; sympy would go through the product rule
-            constant = Mul(*(factor for factor in Mul.make_args(term) if factor != moving[0]))
-            if moving[0] not in constant.free_symbols:
-                return constant * self._rates[moving[0]]
-        return Add(*(term.diff(symbol) * self._rates[symbol] for symbol in moving), term.diff(TIME))
+        """The time derivative of a sum of functions of time and of what is linear in coordinates and their rates."""
+        moving = self._rates.keys()
+        return Add(
+            *(
+                term.diff(TIME) if moving.isdisjoint(term.free_symbols) else term.xreplace(self._rates)
+                for term in Add.make_args(expression)
+            )
+        )
 
     def across(self, plus: int, minus: int) -> Expr:
-        """The position of a node less that of another."""
-        return self.positions[plus] - self.positions[minus]
+        """The position of a node less that of another, each coordinate once with its factor in shortest form."""
+        factors: dict[Symbol, list[Expr]] = {}
+        for term in Add.make_args(self.positions[plus] - self.positions[minus]):
+            for symbol in term.free_symbols & self._rates.keys():  # one: positions are linear
+                factors.setdefault(symbol, []).append(term.coeff(symbol))
+        return Add(*(tidy(symbol * (_shortest(Add(*of)) if len(of) > 1 else of[0])) for symbol, of in factors.items()))
 
     def twist(self, branch: GraphBranch) -> Expr:
         """The position across a branch."""
@@ -240,7 +242,7 @@ def _independent(rows: Mapping[int, Row], parameters: Mapping[str, float]) -> tu
     return tuple(independent)
 
 
-def shortest(ratio: Expr) -> Expr:
+def _shortest(ratio: Expr) -> Expr:
     """A ratio without common factors above and below; decimals are rounded only once."""
     return ratio if ratio.is_Integer else in_decimals(cancel(exactly(ratio)))
 
@@ -254,5 +256,5 @@ def _solved(rows: Sequence[Row], columns: Sequence[int]) -> Iterator[tuple[int, 
     reduced, pivots = DomainMatrix.from_dict_sympy(len(rows), len(columns), entries).to_field().rref()
     for i, row in sorted(reduced.to_dod().items()):
         pivot = columns[pivots[i]]
-        factors = {columns[k]: shortest(-reduced.domain.to_sympy(entry)) for k, entry in row.items()}
+        factors = {columns[k]: _shortest(-reduced.domain.to_sympy(entry)) for k, entry in row.items()}
         yield pivot, {key: factor for key, factor in factors.items() if key != pivot}

@@ -14,21 +14,18 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import SimpleNamespace
+from typing import TYPE_CHECKING
 
-from sympy import Add, Derivative, Eq, Expr, Function, Integer, Symbol, sqrt
-from sympy.core.function import AppliedUndef
+from sympy import Add, Eq, Expr, Function, Integer, Symbol, sqrt
 
 from shaftwork.components.base import Derived
 from shaftwork.components.laws import t
 from shaftwork.components.shafts import Shaft
-from shaftwork.core.domains import ROTATION
-from shaftwork.equations.assembly import branches_of, sides, terms_of
-from shaftwork.equations.letters import parameter_letters
-from shaftwork.equations.notations import Letter, in_letters, inverses_of
-from shaftwork.equations.rows import NetworkEquations, with_derived
-from shaftwork.latex.printing import Line, Writer, with_rates
-from shaftwork.latex.spelling import without_marks
+from shaftwork.equations.assembly import branches_of
 from shaftwork.network.graph import GROUND, GraphPart
+
+if TYPE_CHECKING:
+    from shaftwork.equations.records import Equations
 
 X = Symbol("x", real=True)
 """The place along a shaft, from its node a."""
@@ -43,7 +40,7 @@ class Field:
         part: the shaft.
     """
 
-    equations: NetworkEquations
+    equations: Equations
     part: GraphPart
 
     @cached_property
@@ -105,7 +102,7 @@ class Field:
     def _taken_from(self, node: int) -> Iterator[Expr]:
         """What the other parts at a node give, less what their inertias take."""
         assembly, graph = self.equations.assembly, self.equations.form.graph
-        for other in self._fields:
+        for other in self.equations.fields:
             if other.part is not self.part:
                 ends = (("a", -1, Integer(0)), ("b", 1, other.symbol("length")))
                 yield from (sign * other.torque.subs(X, x) for end, sign, x in ends if other.part.nodes[end] == node)
@@ -116,87 +113,20 @@ class Field:
     @cached_property
     def definitions(self) -> Mapping[Symbol, Expr]:
         """The letters in the rows that follow from parameters."""
-        definitions = {self.symbol(derived.name): derived.law for derived in self._derived}
+        definitions = {self.symbol(derived.name): derived.law for derived in self.derived}
         if any(row.has(self.symbol("v")) for row in self.rows):
             definitions[self.symbol("v")] = sqrt(self.symbol("line_stiffness") / self.symbol("line_inertia"))
         return definitions
 
     @cached_property
-    def _derived(self) -> tuple[Derived, ...]:
+    def derived(self) -> tuple[Derived, ...]:
+        """What follows from the parameters, but for the speed of waves."""
         names = ("area_moment", "line_inertia", "line_stiffness")
         symbols = SimpleNamespace(**{name: self.symbol(name) for name in (*self.part.component.declared, *names)})
         return tuple(derived for derived in self.part.component.derived(symbols) if derived.name in names)
 
-    def lines(self, *, values: bool = False) -> tuple[tuple[Line, ...], tuple[Line, ...], tuple[Line, ...]]:
-        """The rows, the boundary conditions and the definitions in LaTeX; with values there are no definitions."""
-        writer = self._writer(with_derived(self.equations.values, self.definitions) if values else {})
-        defined = () if values else in_letters(self.definitions, self._inverses)
-        return (
-            tuple(dict.fromkeys(self._line(row, writer) for row in self.rows)),  # (14) and (15) have the same numbers
-            tuple(self._line(row, writer) for row in self.boundary),
-            tuple(writer.line(sides(symbol, (law,))) for symbol, law in defined),
-        )
 
-    def _line(self, row: Eq, writer: Writer) -> Line:
-        left, right = (side.xreplace(self._atoms).expand() for side in row.args)
-        return writer.line(sides(left, terms_of(right)))
-
-    @cached_property
-    def _fields(self) -> tuple[Field, ...]:
-        """Of all shafts of the network."""
-        return fields_of(self.equations)
-
-    @cached_property
-    def _atoms(self) -> dict[Expr, Symbol]:
-        """A symbol for every function and derivative in the rows."""
-        rows = (row.atoms(Derivative, AppliedUndef) for row in (*self.rows, *self.boundary))
-        return {atom: Symbol(str(atom), real=True) for atoms in rows for atom in sorted(atoms, key=str)}
-
-    @cached_property
-    def _letters(self) -> tuple[Letter, ...]:
-        """The letters of the shaft."""
-        component, name = self.part.component, self.part.name
-        waves = Derived("v", Integer(0), "m/s", "speed of waves", "v")
-        parameters = parameter_letters(name, (*component.declared.values(), *self._derived, waves))
-        quantities = (("tau", ROTATION.through, ""), ("tau_c", ROTATION.through, "c"), ("omega", ROTATION.across, ""))
-        variables = (Letter(f"{name}.{label}", q.latex, mark, q.unit, "") for label, q, mark in quantities)
-        return tuple(map(self.equations.source.written, (*parameters, *variables)))
-
-    @cached_property
-    def _inverses(self) -> dict[Symbol, Symbol]:
-        return inverses_of(self._letters)
-
-    @cached_property
-    def _names(self) -> dict[str, str]:
-        """The letters of the shaft in LaTeX, with the subscript that its length has."""
-        _, _, subscript = self.equations.symbol_names[f"{self.part.name}.length"].partition("_")
-        return {letter.name: letter.printed(subscript.removeprefix("{").removesuffix("}")) for letter in self._letters}
-
-    def _writer(self, values: Mapping[str, float]) -> Writer:
-        rates = with_rates(self.equations.symbol_names, self.equations.source.rate_of)
-        along = {name: latex for field in self._fields for name, latex in field._names.items()}  # noqa: SLF001
-        atoms = {symbol.name: _printed(atom, along) for atom, symbol in self._atoms.items()}
-        names = {**along, **atoms, **{name: latex for name, latex in rates.items() if name not in along}}
-        parameters = [letter.name for letter in (*self.equations.letters, *self._letters) if letter.parameter]
-        order = sorted(names, key=lambda name: name not in set(parameters))
-        last = [symbol.name for symbol in self._atoms.values()]
-        return Writer({name: names[name] for name in order}, parameters, last, values, self._inverses)
-
-
-def fields_of(equations: NetworkEquations) -> tuple[Field, ...]:
+def fields_of(equations: Equations) -> tuple[Field, ...]:
     """The equations along every shaft of a network."""
     shafts = (part for part in equations.form.graph.parts if isinstance(part.component, Shaft))
     return tuple(Field(equations, part) for part in shafts)
-
-
-def _printed(atom: Expr, letters: Mapping[str, str]) -> str:
-    """A function of x and t, or a derivative of one."""
-    function = atom.expr if isinstance(atom, Derivative) else atom
-    where = ", ".join(without_marks(letters.get(str(place), str(place))) for place in function.args)
-    text = f"{letters[str(function.func)]}({where})"
-    if not isinstance(atom, Derivative):
-        return text
-    order = sum(times for _, times in atom.variable_count)
-    power = f"^{{{order}}}" if order > 1 else ""
-    below = r" \, ".join(rf"\partial {v}" + (f"^{{{n}}}" if n > 1 else "") for v, n in atom.variable_count)
-    return rf"\frac{{\partial{power} {text}}}{{{below}}}"

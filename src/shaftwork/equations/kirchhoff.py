@@ -1,29 +1,164 @@
-"""Kirchhoff's equations of a network as records: balances at nodes, speeds around loops, laws, states."""
+"""Kirchhoff's equations of a network as records: balances at nodes, speeds around loops, laws, states.
+
+An equation knows its parts, branches and nodes, and becomes sympy when it is first read.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import chain
+from typing import Literal
 
-from sympy import Expr, Symbol
+from sympy import Add, Eq, Expr, Symbol
 
-from shaftwork.equations.assembly import Assembly, Sides, branches_of, sides
+from shaftwork.equations.assembly import Assembly, FactoredTerms, Sides, branches_of, sides
 from shaftwork.equations.quantities import rate_of
 from shaftwork.equations.records import Equations
-from shaftwork.equations.rows import (
-    CouplingEquation,
-    Eliminated,
-    LawEquation,
-    LoopEquation,
-    NodeEquation,
-    StateEquation,
-)
 from shaftwork.equations.solved_rows import EliminationSystem, SolvedForm
 from shaftwork.formulation.form import StateForm, branch_name
 from shaftwork.formulation.gains import Number
 from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One equation and where it comes from.
+
+    Args:
+        parts: names of the parts that take part, in the order of the network.
+        branches: their branches.
+        nodes: names of the nodes concerned.
+        make: makes both sides; called when the row is first read.
+    """
+
+    parts: tuple[str, ...]
+    branches: tuple[int, ...]
+    nodes: tuple[str, ...]
+    make: Callable[[], Sides]
+
+    @cached_property
+    def sides(self) -> Sides:
+        """Left side, and the groups of terms on the right, as they are printed."""
+        return self.make()
+
+    @property
+    def left(self) -> Expr:
+        """The left side."""
+        return self.sides.left
+
+    @property
+    def groups(self) -> tuple[FactoredTerms, ...]:
+        """The right side as groups of terms under a common factor."""
+        return self.sides.groups
+
+    @cached_property
+    def right(self) -> Expr:
+        """The right side as one expression."""
+        return Add(*(factor * Add(*terms) for factor, terms in self.groups))
+
+    @property
+    def equation(self) -> Eq:
+        """Left side = right side."""
+        return Eq(self.left, self.right, evaluate=False)
+
+    @property
+    def expression(self) -> Expr:
+        """Right side less left side; zero where the equation holds."""
+        return self.right - self.left
+
+    @property
+    def trivial(self) -> bool:
+        """Whether both sides are the same symbol, so that there is nothing to print."""
+        return bool(self.expression == 0)
+
+
+@dataclass(frozen=True, eq=False)
+class NodeEquation(Row):
+    """The balance at a node. `expression` is the sum of all that it receives, which is zero (Popenda 2019, (1)-(3)).
+
+    Args:
+        node: name of the node.
+        number: its number.
+        assembly: knows the factors.
+    """
+
+    node: str
+    number: int
+    assembly: Assembly
+
+    @cached_property
+    def coefficients(self) -> Mapping[int, Expr]:
+        """For each branch the factor with which it takes its through variable from the node: 1, -1 or a ratio."""
+        return {branch: Add(*self.assembly.incidence(branch, self.number)) for branch in self.branches}
+
+
+@dataclass(frozen=True, eq=False)
+class LoopEquation(Row):
+    """Speed around the fundamental loop of a link (Popenda 2019, (4)).
+
+    Args:
+        link: the link's branch number.
+        assembly: knows the factors.
+    """
+
+    link: int
+    assembly: Assembly
+
+    @cached_property
+    def coefficients(self) -> Mapping[int, Expr]:
+        """For each tree branch of the loop the factor with which its across variable enters."""
+        return dict(self.assembly.factors(self.link))
+
+
+@dataclass(frozen=True, eq=False)
+class StateEquation(Row):
+    """The rate of a state.
+
+    Args:
+        name: name of the state.
+        symbol: its symbol.
+        unit: its SI unit.
+        system: makes the equations that the rates of states of its kind are solved from; None for an integral.
+    """
+
+    name: str
+    symbol: Symbol
+    unit: str
+    system: Callable[[], EliminationSystem] | None
+
+    @cached_property
+    def explicit(self) -> bool:
+        """False where more rates are coupled than are solved symbolically; the left side then holds them all."""
+        return self.system is None or self.system().solved(self.branches[0])
+
+    @cached_property
+    def coupled(self) -> Sides:
+        """The row before it is solved: where several rates stand in it, it is far shorter so."""
+        return self.sides if self.system is None else self.system().coupled(self.branches[0])
+
+    @property
+    def rate(self) -> Expr:
+        """d(state)/dt, where the row is explicit; else what the coupled rates on the left side sum up to."""
+        return self.right
+
+
+@dataclass(frozen=True, eq=False)
+class Eliminated(Row):
+    """A quantity that is no state although it might have been, or is algebraic, and how it follows.
+
+    Args:
+        what: name of the quantity.
+        why: the reason in words.
+        kind: "speed" (of a geared store or node), "torque" (of a store in series), "algebraic" or "reaction".
+    """
+
+    what: str
+    why: str
+    kind: Literal["speed", "torque", "algebraic", "reaction"]
+
 
 Origin = tuple[tuple[str, ...], tuple[int, ...], tuple[str, ...]]
 
@@ -80,37 +215,31 @@ class _KirchhoffWriter:
                 origin = self.origin((link, *self.form.tree.loops[link]))
                 yield LoopEquation(*origin, partial(self.assembly.loop, link), link, self.assembly)
 
-    def laws(self) -> Iterator[LawEquation]:
+    def laws(self) -> Iterator[Row]:
         for flow in self.assembly.quantities.flows:
             kinds = {self.assembly.kind(branch) for branch in flow.branches}
             if kinds != {Kind.ACROSS_SOURCE}:
-                yield LawEquation(*self.origin(flow.branches), partial(self.assembly.law_of_flow, flow))
+                yield Row(*self.origin(flow.branches), partial(self.assembly.law_of_flow, flow))
             for branch in flow.branches:
                 if self.assembly.kind(branch) is Kind.THROUGH_STORE:
-                    yield LawEquation(*self.origin((branch,)), partial(self.assembly.law_of_store, branch))
+                    yield Row(*self.origin((branch,)), partial(self.assembly.law_of_store, branch))
                 elif self.assembly.kind(branch) is Kind.ACROSS_SOURCE:
-                    yield LawEquation(*self.origin((branch,)), partial(self.assembly.law_of_source, branch))
+                    yield Row(*self.origin((branch,)), partial(self.assembly.law_of_source, branch))
         for end, other in self.assembly.opposite.items():
-            yield LawEquation(*self.origin((end, other)), partial(self.assembly.law_of_history, end))
+            yield Row(*self.origin((end, other)), partial(self.assembly.law_of_history, end))
 
-    def couplings(self) -> Iterator[CouplingEquation]:
+    def couplings(self) -> Iterator[Row]:
         for branch in self.graph.branches:
             if branch.terms:
-                yield CouplingEquation(*self.origin((branch.index,)), partial(self.assembly.coupling, branch.index))
+                yield Row(*self.origin((branch.index,)), partial(self.assembly.coupling, branch.index))
 
     def states(self) -> Iterator[StateEquation]:
-        systems = {"across": self._speeds, "through": self._torques}
+        systems = {"across": lambda: self.solution.speeds, "through": lambda: self.solution.torques}
         for state in self.form.states:
             branch, system = state.branch, systems.get(state.kind)
             make = partial(_row, system, branch) if system else partial(self._integral_row, branch)
             symbol = Symbol(state.name, real=True)
             yield StateEquation(*self.origin((branch,)), make, state.name, symbol, state.unit, system)
-
-    def _speeds(self) -> EliminationSystem:
-        return self.solution.speeds
-
-    def _torques(self) -> EliminationSystem:
-        return self.solution.torques
 
     def _integral_row(self, branch: int) -> Sides:
         link = branch in self.form.tree.loops
@@ -120,7 +249,7 @@ class _KirchhoffWriter:
     def eliminated(self) -> Iterator[Eliminated]:
         yield from self._dependent_speeds()
         for branch in self.form.dependent_through:
-            make = partial(self._carried, self.assembly.quantities.store, branch)
+            make = partial(self._carried, branch)
             name = branch_name(self.graph, self.graph.branches[branch])
             yield Eliminated(*self._cutset(branch), make, name, self._series(branch), "torque")
         for branch in self.form.tree_conductances:
@@ -175,27 +304,21 @@ class _KirchhoffWriter:
 
     def _reactions(self) -> Iterator[Eliminated]:
         for branch in self.form.tree.tree[Kind.COUPLING]:
-            sign = self.assembly.quantities.multiplier_sign(branch)
-            make = partial(self._carried, self.assembly.quantities.multiplier, branch, sign)
+            make = partial(self._carried, branch)
             ideal = "" if self.graph.branches[branch].template.through else "is ideal: it "
             why = f"{self.part(branch)} {ideal}takes whatever the balance asks"
             yield Eliminated(*self._cutset(branch), make, f"reaction of {self.part(branch)}", why, "reaction")
         for branch in self.form.across_sources:
             why = f"{self.part(branch)} supplies whatever its prescribed value takes"
-            make = partial(self._supplied, branch)
+            make = partial(self._carried, branch)
             yield Eliminated(*self._cutset(branch), make, f"reaction of {self.part(branch)}", why, "reaction")
 
     def _cutset(self, branch: int) -> Origin:
         return self.origin((branch, *(link for link, _ in self.assembly.cutsets.get(branch, ()))))
 
-    def _carried(self, symbol: Callable[[int], Expr], branch: int, sign: int = 1) -> Sides:
-        return sides(symbol(branch), (sign * term for term in self.assembly.out_of(branch)))
-
-    def _supplied(self, branch: int) -> Sides:
-        flow = self.assembly.quantities.flow_of[branch]
-        return sides(
-            self.assembly.quantities.through(flow), (flow.sign * term for term in self.assembly.out_of(branch))
-        )
+    def _carried(self, branch: int) -> Sides:
+        symbol, sign = self.assembly.quantities.passing(branch)
+        return sides(symbol, (sign * term for term in self.assembly.out_of(branch)))
 
     def _series(self, branch: int) -> str:
         members = [link for link, _ in self.assembly.cutsets.get(branch, ())]

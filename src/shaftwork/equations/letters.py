@@ -7,15 +7,15 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import count
 
-from sympy import Symbol
+from sympy import Expr, Float, Symbol
 
 from shaftwork.components.base import Derived
 from shaftwork.core.domains import ELECTRICAL, Quantity
 from shaftwork.core.parameters import Parameter
 from shaftwork.equations.notations import Letter, Notation
 from shaftwork.equations.quantities import Quantities, ThroughQuantity, running_number
+from shaftwork.equations.spelling import GREEK, chosen_subscript, escaped, indexed, split_index, without_marks
 from shaftwork.formulation.form import StateForm
-from shaftwork.latex.spelling import GREEK, chosen_subscript, escaped, indexed, split_index, without_marks
 from shaftwork.network.graph import GraphBranch
 from shaftwork.network.kinds import Kind
 
@@ -236,3 +236,11 @@ def _nodes(quantities: Quantities, source: Notation) -> Iterator[tuple[str, Name
                 _letter(quantities.angle(number), domain.integral),
             )
             yield f"node of {domain.name}", Named(name, tuple(map(source.written, letters)), None, ())
+
+
+def with_derived(values: Mapping[str, float], definitions: Mapping[Symbol, Expr]) -> dict[str, float]:
+    """Values of parameters, and of what is derived from them."""
+    numbers = dict(values)
+    for symbol, law in definitions.items():
+        numbers[symbol.name] = float(law.xreplace({each: Float(numbers[each.name]) for each in law.free_symbols}))
+    return numbers

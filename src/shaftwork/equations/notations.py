@@ -10,7 +10,7 @@ from sympy import Expr, Symbol
 
 from shaftwork.core.domains import DOMAINS
 from shaftwork.core.errors import ParameterError
-from shaftwork.latex.spelling import indexed
+from shaftwork.equations.spelling import indexed
 
 INVERSE = " inverse"
 """At the end of the name of a letter that stands for the reciprocal of a parameter."""

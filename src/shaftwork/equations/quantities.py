@@ -218,6 +218,15 @@ class Quantities:
         """The through variable of a through store alone, without the loss beside it."""
         return Symbol(branch_name(self.graph, self.graph.branches[branch]), real=True)
 
+    def passing(self, branch: int) -> tuple[Symbol, int]:
+        """Symbol and sign of what passes through a branch whose law does not give it by what is across."""
+        match self.graph.branches[branch].template.kind:
+            case Kind.THROUGH_STORE:
+                return self.store(branch), 1
+            case Kind.COUPLING:
+                return self.multiplier(branch), self.multiplier_sign(branch)
+        return self.through(self.flow_of[branch]), self.flow_of[branch].sign
+
     def multiplier(self, branch: int) -> Symbol:
         """The through variable of a coupling: a term of coefficient r takes r times it from its node."""
         part = self.graph.branches[branch].part

@@ -1,4 +1,4 @@
-"""The second-order form of a mechanical network: M phi'' + D phi' + K phi = T.
+"""Energies, losses and torques in generalised coordinates, and the second-order form M phi'' + D phi' + K phi = T.
 
 The coordinates are the angles and positions of nodes that couplings and prescribed speeds leave free, counted from the
 untwisted position. A node without inertia keeps its coordinate: its row of M is empty.
@@ -6,23 +6,115 @@ untwisted position. A node without inertia keeps its coordinate: its row of M is
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
-from sympy import Add, Expr, Integer, Mul, Symbol
+from sympy import Add, Expr, Integer, Rational, Symbol, expand
 
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.law_slopes import jumps, slope
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import CompileError
-from shaftwork.equations.coordinates import coordinates, shortest
-from shaftwork.equations.quantities import INSTEAD, Quantities, rate_of, refuse_controlled
+from shaftwork.equations.assembly import FactoredTerms, rising_first, terms_of, tidy
+from shaftwork.equations.coordinates import Coordinates, coordinates
+from shaftwork.equations.quantities import INSTEAD, Quantities, refuse_controlled
 from shaftwork.network.graph import CircuitGraph, GraphBranch
 from shaftwork.network.kinds import Kind
 
 Entries = Mapping[tuple[int, int], Expr]
+
+
+class Square(NamedTuple):
+    """Half of a coefficient times the square of a position or speed: an energy, or half of a loss.
+
+    Attributes:
+        branch: number of the branch.
+        coefficient: inertia, stiffness or damping.
+        along: what is squared.
+    """
+
+    branch: int
+    coefficient: Expr
+    along: Expr
+
+    @property
+    def energy(self) -> Expr:
+        """The whole term."""
+        return Rational(1, 2) * self.coefficient * self.along**2
+
+    def pull(self, symbol: Symbol) -> FactoredTerms:
+        """Minus the term differentiated: a torque."""
+        return FactoredTerms(tidy(-self.coefficient * self.along.diff(symbol)), rising_first(terms_of(self.along)))
+
+
+class GeneralisedTorque(NamedTuple):
+    """What a branch takes from nodes, and the position on which that does work.
+
+    Args:
+        branch: number of the branch.
+        size: the torque, force or current.
+        along: position across the branch; of a coupling with losses the sum that its torques work on.
+    """
+
+    branch: int
+    size: Expr
+    along: Expr
+
+
+@dataclass(eq=False)
+class Energies:
+    """All of them, branch by branch.
+
+    Args:
+        at: the coordinates.
+        inertias: kinetic energies.
+        springs: potential energies, also of laws that are linear in the twist.
+        dampers: terms of Rayleigh's function.
+        torques: of laws and sources.
+        laws: those that stand in `torques` by their symbols, in coordinates and rates.
+    """
+
+    at: Coordinates
+    inertias: list[Square] = field(default_factory=list)
+    springs: list[Square] = field(default_factory=list)
+    dampers: list[Square] = field(default_factory=list)
+    torques: list[GeneralisedTorque] = field(default_factory=list)
+    laws: dict[Symbol, Expr] = field(default_factory=dict)
+
+    def enter(self, branches: Iterable[GraphBranch]) -> None:
+        """Put branches down as energies, losses or torques; sources of speed and couplings are none of these."""
+        for branch in branches:
+            law = self.at.quantities.law(branch.index)
+            match branch.template.kind:
+                case Kind.ACROSS_STORE:
+                    self.inertias.append(Square(branch.index, law, self.at.speed(branch)))
+                case Kind.THROUGH_STORE:
+                    self.springs.append(Square(branch.index, law, self.at.twist(branch)))
+                case Kind.CONDUCTANCE:
+                    self.dampers.append(Square(branch.index, law, self.at.speed(branch)))
+                case Kind.LAW | Kind.THROUGH_SOURCE:
+                    self._enter_law(branch, law)
+
+    def _enter_law(self, branch: GraphBranch, law: Expr) -> None:
+        """What is linear in the twist is an energy; what is left a torque, by its symbol where it has one."""
+        flow, twist, whole = self.at.quantities.flow_of[branch.index], self.at.twist(branch), True
+        if (stiffness := _linear_stiffness(law)) != 0:
+            rest, whole = law.subs(INTEGRAL, 0), False
+            fixed = not branch.template.reads and not rest.has(ACROSS, TIME)
+            shift = expand(rest / stiffness) if fixed else Integer(0)
+            self.springs.append(Square(branch.index, stiffness, twist + shift))
+            law = Integer(0) if fixed else rest
+            if law == 0:
+                return
+        size, symbol = self.at.by_law(branch, law), self.at.quantities.through(flow)
+        if whole and len(flow.branches) == 1:
+            if symbol != flow.sign * size:
+                self.laws[symbol] = flow.sign * size
+            size = flow.sign * symbol
+        self.torques.append(GeneralisedTorque(branch.index, size, twist))
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,40 +122,35 @@ class SecondOrder:
     """M phi'' + D phi' + K phi = T.
 
     Args:
-        nodes: names of the nodes whose angle or position is a coordinate.
-        coordinates: their symbols.
+        at: the angles and positions that are coordinates, and all others in terms of them.
         mass: nonzero entries of M by row and column; row by row, columns rising.
         damping: those of D.
         stiffness: those of K.
         forces: T; the torques and forces of laws and sources stand in it by their symbols.
         laws: those torques and forces in terms of the coordinates and their rates.
-        across: what is across those laws, and its integral, in terms of the coordinates and their rates.
-        prescribed: speed of every prescribed angle or position that `forces` contains.
     """
 
-    nodes: tuple[str, ...]
-    coordinates: tuple[Symbol, ...]
+    at: Coordinates
     mass: Entries
     damping: Entries
     stiffness: Entries
     forces: tuple[Expr, ...]
     laws: Mapping[Symbol, Expr]
-    across: Mapping[Symbol, Expr]
-    prescribed: Mapping[Symbol, Expr]
 
     @cached_property
-    def velocities(self) -> tuple[Symbol, ...]:
-        """The rates of the coordinates."""
-        return tuple(map(rate_of, self.coordinates))
+    def nodes(self) -> tuple[str, ...]:
+        """Names of the nodes whose angle or position is a coordinate."""
+        return tuple(self.at.quantities.graph.nodes[node] for node in self.at.free)
 
-    @cached_property
-    def accelerations(self) -> tuple[Symbol, ...]:
-        """The second derivatives of the coordinates."""
-        return tuple(map(rate_of, self.velocities))
+    @property
+    def coordinates(self) -> tuple[Symbol, ...]:
+        """Their symbols."""
+        return self.at.symbols
 
     def terms(self, row: int) -> Iterator[Expr]:
         """The terms of a row of M phi'' + D phi' + K phi."""
-        pairs = ((self.mass, self.accelerations), (self.damping, self.velocities), (self.stiffness, self.coordinates))
+        at = self.at
+        pairs = ((self.mass, at.accelerations), (self.damping, at.velocities), (self.stiffness, at.symbols))
         for entries, factors in pairs:
             for (i, j), entry in entries.items():
                 if i == row:
@@ -87,94 +174,50 @@ def second_order(graph: CircuitGraph) -> SecondOrder:
             f"{', '.join(electrical[:6])}{', ...' if len(electrical) > 6 else ''}.{INSTEAD}"
         )
     refuse_controlled(graph)
-    return _SecondOrderWriter(graph).second_order()
+    at = coordinates(Quantities(graph))
+    energies, forces = Energies(at), [list[Expr]() for _ in at.symbols]
+    energies.enter(graph.branches)
+    mass = _matrix(energies.inertias, at.velocities, forces, at.rate)
+    damping = _matrix(energies.dampers, at.velocities, forces)
+    stiffness = _matrix(energies.springs, at.symbols, forces)
+    for torque in energies.torques:
+        for i, gain in _gains(torque.along, at.symbols).items():
+            forces[i].append(-gain * torque.size)
+    return SecondOrder(at, mass, damping, stiffness, tuple(Add(*terms) for terms in forces), energies.laws)
 
 
-class _SecondOrderWriter:
-    def __init__(self, graph: CircuitGraph) -> None:
-        self.graph, self.quantities = graph, Quantities(graph)
-        self.at = coordinates(self.quantities)
-        self.place = {symbol: k for k, symbol in enumerate(self.at.symbols)}
-        self.moving = frozenset((*self.place, *self.at.prescribed))
-        self.matrices: dict[Kind, dict[tuple[int, int], list[Expr]]] = {
-            kind: {} for kind in (Kind.ACROSS_STORE, Kind.CONDUCTANCE, Kind.THROUGH_STORE)
-        }
-        self.forces: list[list[Expr]] = [[] for _ in self.place]
-        self.laws: dict[Symbol, Expr] = {}
-        self.across: dict[Symbol, Expr] = {}
-        self.prescribed: dict[Symbol, Expr] = {}
+def _matrix(
+    squares: Sequence[Square],
+    symbols: Sequence[Symbol],
+    forces: Sequence[list[Expr]],
+    felt: Callable[[Expr], Expr] = lambda driven: driven,
+) -> Entries:
+    """The sum of coefficient * f f' over squares of f' symbols; what is prescribed of them goes to the forces.
 
-    def second_order(self) -> SecondOrder:
-        for branch in self.graph.branches:
-            if branch.template.kind in self.matrices:
-                self._add_linear(branch, branch.template.kind, self.quantities.law(branch.index))
-            elif branch.template.kind in (Kind.LAW, Kind.THROUGH_SOURCE):
-                self._add_force(branch)
-        mass, damping, stiffness = (
-            {key: total for key in sorted(entries) if (total := Add(*entries[key])) != 0}
-            for entries in self.matrices.values()
-        )
-        nodes = tuple(self.graph.nodes[node] for node in self.at.free)
-        forces = tuple(Add(*terms) for terms in self.forces)
-        return SecondOrder(
-            nodes, tuple(self.place), mass, damping, stiffness, forces, self.laws, self.across, self.prescribed
-        )
-
-    def _parted(self, position: Expr) -> tuple[dict[int, Expr], list[Expr]]:
-        """A position as factors of the coordinates by their places, in shortest form, and the terms prescribed."""
-        factors: dict[Symbol, Expr] = {}
-        for term in Add.make_args(position):
-            for symbol in term.free_symbols & self.moving:  # one: positions are linear
-                factor = Mul(*(other for other in Mul.make_args(term) if other != symbol))
-                factors[symbol] = factors.get(symbol, Integer(0)) + factor
-        short = {symbol: gain for symbol, factor in factors.items() if (gain := shortest(factor)) != 0}
-        gains = {self.place[symbol]: gain for symbol, gain in short.items() if symbol in self.place}
-        prescribed = {symbol: speed for symbol, speed in self.at.prescribed.items() if symbol in short}
-        self.prescribed |= prescribed
-        return dict(sorted(gains.items())), [short[symbol] * symbol for symbol in prescribed]
-
-    def _add_linear(self, branch: GraphBranch, kind: Kind, coefficient: Expr) -> None:
-        """Add coefficient * f f' for an inertia, a damping or a stiffness; what a prescribed motion asks goes to T."""
-        gains, driven = self._parted(self.at.twist(branch))
-        if kind is not Kind.THROUGH_STORE:
-            driven = list(map(self.at.rate, driven))
-        if kind is Kind.ACROSS_STORE:
-            driven = list(map(self.at.rate, driven))
+    Args:
+        squares: the energies or losses.
+        symbols: the coordinates or their rates.
+        forces: of each coordinate, to which terms are added.
+        felt: what the coefficient is multiplied by, from what is prescribed of the position or speed that is squared.
+    """
+    entries: dict[tuple[int, int], list[Expr]] = {}
+    for square in squares:
+        gains = _gains(square.along, symbols)
+        driven = [term for term in Add.make_args(square.along) if term.free_symbols.isdisjoint(symbols)]
         for i, gain in gains.items():
             for j, other in gains.items():
-                self.matrices[kind].setdefault((i, j), []).append(gain * coefficient * other)
-            self.forces[i] += (-gain * coefficient * term for term in driven)
-
-    def _add_force(self, branch: GraphBranch) -> None:
-        """Add the torque of a law or source to the coordinates that it drives: minus its power per speed.
-
-        A law that is linear in the twist, as that of a gap in contact, is a stiffness, and what is left a torque.
-        """
-        law, whole = self.quantities.law(branch.index), True
-        if (stiffness := linear_stiffness(law)) != 0:
-            self._add_linear(branch, Kind.THROUGH_STORE, stiffness)
-            law, whole = law.subs(INTEGRAL, 0), False
-            if law == 0:
-                return
-        at, flow = self.at, self.quantities.flow_of[branch.index]
-        gains, driven = self._parted(at.twist(branch))
-        twist = Add(*(gain * at.symbols[k] for k, gain in gains.items()), *driven)
-        across = Add(*(gain * at.velocities[k] for k, gain in gains.items()), *map(at.rate, driven))
-        law = law.xreplace({ACROSS: across, INTEGRAL: twist})
-        symbol = self.quantities.across((branch.plus, branch.minus))
-        for letter in symbol.free_symbols:  # one at most: the across variable of two nodes has one symbol
-            self.across[letter] = across * symbol.coeff(letter)
-        self.across[self.quantities.integral(branch.index)] = twist
-        if whole and len(flow.branches) == 1:
-            symbol = self.quantities.through(flow)
-            if symbol != flow.sign * law:
-                self.laws[symbol] = flow.sign * law
-            law = flow.sign * symbol
-        for i, gain in gains.items():
-            self.forces[i].append(-gain * law)
+                entries.setdefault((i, j), []).append(gain * square.coefficient * other)
+            forces[i] += (-gain * square.coefficient * felt(term) for term in driven)
+    return {key: total for key in sorted(entries) if (total := Add(*entries[key])) != 0}
 
 
-def linear_stiffness(law: Expr) -> Expr:
+def _gains(along: Expr, symbols: Sequence[Symbol]) -> dict[int, Expr]:
+    """The factors of the coordinates or rates in a linear sum, by their places."""
+    moving = along.free_symbols
+    return {place: along.coeff(symbol) for place, symbol in enumerate(symbols) if symbol in moving}
+
+
+def _linear_stiffness(law: Expr) -> Expr:
     """The slope of a law over the twist where it is the same everywhere, else 0."""
     if not law.has(INTEGRAL) or jumps(law, INTEGRAL):
         return Integer(0)

@@ -8,33 +8,126 @@ have energies like drive trains: a capacitor's is kinetic, a coil's potential. S
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import NamedTuple, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
-from sympy import Add, Expr, Integer, Symbol, cancel, expand
+from sympy import Add, Expr, Integer, Symbol, cancel
 
-from shaftwork.components.branches import ACROSS, HISTORY, INTEGRAL
-from shaftwork.components.laws import t as TIME
+from shaftwork.components.branches import ACROSS, HISTORY
 from shaftwork.equations.assembly import FactoredTerms, Sides, sides, terms_of
 from shaftwork.equations.coordinates import Coordinates, coordinates, is_prescribed
-from shaftwork.equations.rows import NetworkEquations
-from shaftwork.equations.second_order import linear_stiffness
-from shaftwork.lagrange.lagrange_equations import Constraint, LagrangeEquations, MotionEquation, Square
-from shaftwork.lagrange.lagrange_print import blocks_of, document
-from shaftwork.lagrange.lagrange_proof import Proof, prove
-from shaftwork.latex.document import rendered, typeset
+from shaftwork.equations.kirchhoff import Row
+from shaftwork.equations.quantities import rate_of
+from shaftwork.equations.records import Equations
+from shaftwork.equations.second_order import Energies, GeneralisedTorque, Square
 from shaftwork.network.graph import GROUND, GraphBranch
 from shaftwork.network.kinds import Kind
 
+if TYPE_CHECKING:
+    from shaftwork.lagrange.lagrange_proof import Proof
+
 
 @dataclass(frozen=True, eq=False)
-class Lagrangian(LagrangeEquations):
-    """Lagrange's equations of a network, and what is made of them."""
+class MotionEquation(Row):
+    """Lagrange's equation of a coordinate, solved for the rate of its momentum: d/dt(dT/dq') = Q - dV/dq - dR/dq'.
+
+    Args:
+        node: the node whose angle, position or flux linkage the coordinate is.
+        coordinate: its symbol q.
+        force: the generalised force Q.
+        displacements: for each node that moves with the coordinate by how much: its position differentiated by q.
+    """
+
+    node: str
+    coordinate: Symbol
+    force: Expr
+    displacements: Mapping[str, Expr]
+
+
+@dataclass(frozen=True, eq=False)
+class Constraint(Row):
+    """What a part imposes on the rates by a reaction that does work: a gear with losses, a controlled voltage.
+
+    Args:
+        reaction: the torque, force or current with which it does so; it stands in the generalised forces.
+    """
+
+    reaction: Symbol
+
+
+@dataclass(frozen=True, eq=False)
+class Lagrangian:
+    """The energies of a network and the equations of motion that follow.
+
+    Law: d/dt(dL/dq') - dL/dq + dR/dq' = Q with L = T - V. Angles are counted from the untwisted position.
+
+    Args:
+        kirchhoff: Kirchhoff's equations of the same network, in the same phase.
+        coordinates: generalised coordinates q: angles, positions and flux linkages of nodes.
+        inertias: kinetic energies of inertias and masses (and of capacitors).
+        springs: potential energies of springs and of laws that are linear in the twist (and of coils).
+        dampers: terms of Rayleigh's function: of linear dampers (and resistors), half of the power that each loses.
+        equations: the equation of each coordinate, with its generalised force.
+        constraints: what couplings with losses and controlled sources impose besides, each with a reaction in `forces`.
+        reactions: torques, forces and currents of couplings and prescribed speeds, which do no work and stand nowhere.
+        laws: torques, forces and currents that stand in `forces`, in coordinates and rates.
+        motion: every other quantity of Kirchhoff's equations in coordinates and rates: speeds, torques of springs.
+        prescribed: speed of every prescribed angle or position.
+    """
+
+    kirchhoff: Equations
+    coordinates: tuple[Symbol, ...]
+    inertias: tuple[Square, ...]
+    springs: tuple[Square, ...]
+    dampers: tuple[Square, ...]
+    equations: tuple[MotionEquation, ...]
+    constraints: tuple[Constraint, ...]
+    reactions: tuple[Symbol, ...]
+    laws: Mapping[Symbol, Expr]
+    motion: Mapping[Symbol, Expr]
+    prescribed: Mapping[Symbol, Expr]
+
+    @cached_property
+    def kinetic(self) -> Expr:
+        """Kinetic energy T."""
+        return Add(*(square.energy for square in self.inertias))
+
+    @cached_property
+    def potential(self) -> Expr:
+        """Potential energy V."""
+        return Add(*(square.energy for square in self.springs))
+
+    @cached_property
+    def dissipation(self) -> Expr:
+        """Rayleigh's function R, half of the power that linear dampers lose."""
+        return Add(*(square.energy for square in self.dampers))
+
+    @property
+    def forces(self) -> tuple[Expr, ...]:
+        """Generalised force Q of each coordinate: laws and sources by virtual work, in their symbols."""
+        return tuple(row.force for row in self.equations)
+
+    @property
+    def lagrangian(self) -> Expr:
+        """L = T - V."""
+        return self.kinetic - self.potential
+
+    @property
+    def velocities(self) -> tuple[Symbol, ...]:
+        """The rates of the coordinates."""
+        return tuple(map(rate_of, self.coordinates))
+
+    @property
+    def phase(self) -> str:
+        """The mode of every part that changes its mode, "gap open, load stuck", for which the equations hold."""
+        return self.kirchhoff.phase
 
     def proof(self) -> Proof:
         """That these are Kirchhoff's equations: every one compared, with the symbolic difference, which is zero."""
+        from shaftwork.lagrange.lagrange_proof import prove
+
         return prove(self)
 
     def latex(self, *, values: bool = False) -> str:
@@ -43,6 +136,9 @@ class Lagrangian(LagrangeEquations):
         Args:
             values: print the parameters' values instead of their symbols.
         """
+        from shaftwork.lagrange.lagrange_print import blocks_of
+        from shaftwork.latex.document import typeset
+
         return typeset(self.kirchhoff, blocks_of(self, values=values))
 
     def document(self, *, values: bool = False) -> str:
@@ -51,58 +147,50 @@ class Lagrangian(LagrangeEquations):
         Args:
             values: print the parameters' values instead of their symbols.
         """
+        from shaftwork.lagrange.lagrange_print import document
+
         return document(self, values=values)
 
     def _repr_latex_(self) -> str:
+        from shaftwork.lagrange.lagrange_print import blocks_of
+        from shaftwork.latex.document import rendered
+
         return rendered(self.kirchhoff, blocks_of(self, values=False))
 
 
-def lagrangian(equations: NetworkEquations) -> Lagrangian:
+def lagrangian(equations: Equations) -> Lagrangian:
     """Lagrange's equations of the network that Kirchhoff's are given of; of these only the network is read."""
     return _LagrangeWriter(equations).lagrangian()
 
 
-class GeneralisedTorque(NamedTuple):
-    """What a branch takes from nodes, and the position on which that does work.
-
-    Args:
-        branch: number of the branch.
-        size: the torque, force or current.
-        along: position across the branch; of a coupling with losses the sum that its torques work on.
-    """
-
-    branch: int
-    size: Expr
-    along: Expr
-
-
 class _LagrangeWriter:
-    def __init__(self, equations: NetworkEquations) -> None:
+    def __init__(self, equations: Equations) -> None:
         self.equations, self.quantities = equations, equations.assembly.quantities
         self.graph = self.quantities.graph
         self.coordinates = coordinates(self.quantities)
-        self.inertias: list[Square] = []
-        self.springs: list[Square] = []
-        self.dampers: list[Square] = []
-        self.torques: list[GeneralisedTorque] = []
+        self.energies = Energies(self.coordinates)
         self.constraints: list[Constraint] = []
-        self.laws: dict[Symbol, Expr] = {}
 
     def lagrangian(self) -> Lagrangian:
+        energies = self.energies
         for branch in self.graph.branches:
-            self._enter(branch)
+            if (branch.template.kind is Kind.ACROSS_SOURCE and not is_prescribed(branch)) or branch.template.through:
+                self._enter_constraint(branch)
+            energies.enter((branch,))
+            if branch.template.is_history:
+                energies.laws[self.quantities.history(branch.index)] = self._history(branch)
         equations = tuple(self._equations())
-        flows = (flow for flow in self.quantities.flows if self.quantities.through(flow) not in self.laws)
+        flows = (flow for flow in self.quantities.flows if self.quantities.through(flow) not in energies.laws)
         return Lagrangian(
             self.equations,
             self.coordinates.symbols,
-            tuple(self.inertias),
-            tuple(self.springs),
-            tuple(self.dampers),
+            tuple(energies.inertias),
+            tuple(energies.springs),
+            tuple(energies.dampers),
             equations,
             tuple(self.constraints),
-            tuple(map(self._reaction, self.coordinates.imposed)),
-            self.laws,
+            tuple(self.quantities.passing(branch)[0] for branch in self.coordinates.imposed),
+            energies.laws,
             {**self.coordinates.of_flows(flows), **self.coordinates.motion},
             self.coordinates.prescribed,
         )
@@ -111,55 +199,21 @@ class _LagrangeWriter:
     def _accelerations(self) -> frozenset[Symbol]:
         return frozenset(self.coordinates.accelerations)
 
-    def _reaction(self, branch: int) -> Symbol:
-        """What a coupling or prescribed speed gives."""
-        if self.graph.branches[branch].terms:
-            return self.quantities.multiplier(branch)
-        return self.quantities.through(self.quantities.flow_of[branch])
-
-    def _enter(self, branch: GraphBranch) -> None:
-        """Put a branch down as an energy, a loss, a torque or a constraint."""
-        law = self.quantities.law(branch.index)
-        match branch.template.kind:
-            case Kind.ACROSS_STORE:
-                self.inertias.append(Square(branch.index, law, self.coordinates.speed(branch)))
-            case Kind.THROUGH_STORE:
-                self.springs.append(Square(branch.index, law, self.coordinates.twist(branch)))
-            case Kind.CONDUCTANCE:
-                self.dampers.append(Square(branch.index, law, self.coordinates.speed(branch)))
-            case Kind.LAW | Kind.THROUGH_SOURCE:
-                self._enter_law(branch, law)
-            case Kind.ACROSS_SOURCE if not is_prescribed(branch):
-                reaction, sign = self._reaction(branch.index), self.quantities.flow_of[branch.index].sign
-                self._constrain(branch, reaction, self.coordinates.speed(branch), self.coordinates.of(law))
-                self.torques.append(GeneralisedTorque(branch.index, sign * reaction, self.coordinates.twist(branch)))
-            case Kind.COUPLING if branch.template.through:
-                reaction = self._reaction(branch.index)
-                speeds = self.coordinates.rate(self.coordinates.summed(branch, branch.terms))
-                self._constrain(branch, reaction, speeds, Integer(0))
-                self.torques.append(
-                    GeneralisedTorque(branch.index, reaction, self.coordinates.summed(branch, branch.balances))
-                )
-
-    def _enter_law(self, branch: GraphBranch, law: Expr) -> None:
-        """What is linear in the twist is an energy; what is left a torque, by its symbol where it has one."""
-        flow, twist, whole = self.quantities.flow_of[branch.index], self.coordinates.twist(branch), True
-        if (stiffness := linear_stiffness(law)) != 0:
-            rest, whole = law.subs(INTEGRAL, 0), False
-            fixed = not branch.template.reads and not rest.has(ACROSS, TIME)
-            shift = expand(rest / stiffness) if fixed else Integer(0)
-            self.springs.append(Square(branch.index, stiffness, twist + shift))
-            law = Integer(0) if fixed else rest
-            if law == 0:
-                return
-        size, symbol = self.coordinates.by_law(branch, law), self.quantities.through(flow)
-        if branch.template.is_history:
-            self.laws[self.quantities.history(branch.index)] = self._history(branch)
-        if whole and len(flow.branches) == 1:
-            if symbol != flow.sign * size:
-                self.laws[symbol] = flow.sign * size
-            size = flow.sign * symbol
-        self.torques.append(GeneralisedTorque(branch.index, size, twist))
+    def _enter_constraint(self, branch: GraphBranch) -> None:
+        """Put down what a controlled source or a coupling with losses imposes, and the torque that does so."""
+        (reaction, sign), at = self.quantities.passing(branch.index), self.coordinates
+        if branch.terms:
+            left, right = at.rate(at.summed(branch, branch.terms)), Integer(0)
+            along = at.summed(branch, branch.balances)
+        else:
+            left, right = at.speed(branch), at.of(self.quantities.law(branch.index))
+            along = at.twist(branch)
+        self.energies.torques.append(GeneralisedTorque(branch.index, sign * reaction, along))
+        pairs = branch.terms or ((Integer(1), branch.plus, branch.minus),)
+        nodes = dict.fromkeys(node for _, *ends in pairs for node in ends if node != GROUND)
+        names, part = tuple(self.graph.nodes[node] for node in nodes), self.graph.part_of(branch.index).name
+        make = partial(sides, left, (right,))
+        self.constraints.append(Constraint((part,), (branch.index,), names, make, reaction))
 
     def _history(self, branch: GraphBranch) -> Expr:
         """What arrives at an end of a line: what left the other end a delay ago."""
@@ -167,18 +221,13 @@ class _LagrangeWriter:
         speed, history = self.coordinates.speed(self.graph.branches[other]), self.quantities.history(other)
         return self.quantities.printed(branch.index).xreplace({ACROSS: speed, HISTORY: history})
 
-    def _constrain(self, branch: GraphBranch, reaction: Symbol, left: Expr, right: Expr) -> None:
-        pairs = branch.terms or ((Integer(1), branch.plus, branch.minus),)
-        nodes = dict.fromkeys(node for _, *ends in pairs for node in ends if node != GROUND)
-        names, part = tuple(self.graph.nodes[node] for node in nodes), self.graph.part_of(branch.index).name
-        make = partial(sides, left, (right,))
-        self.constraints.append(Constraint((part,), (branch.index,), names, make, reaction))
-
     def _equations(self) -> Iterator[MotionEquation]:
         """The equation of every coordinate."""
         at = self.coordinates
-        inertias, dampers = _by_symbol(self.inertias, at.velocities), _by_symbol(self.dampers, at.velocities)
-        springs, torques = _by_symbol(self.springs, at.symbols), _by_symbol(self.torques, at.symbols)
+        inertias = _by_symbol(self.energies.inertias, at.velocities)
+        dampers = _by_symbol(self.energies.dampers, at.velocities)
+        springs = _by_symbol(self.energies.springs, at.symbols)
+        torques = _by_symbol(self.energies.torques, at.symbols)
         moved = _moved(at)
         for node, symbol, velocity in zip(at.free, at.symbols, at.velocities, strict=True):
             force = Add(*(-term.size * term.along.diff(symbol) for term in torques[symbol]))

@@ -4,23 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 from sympy import Integer
 
 from shaftwork.equations.assembly import FactoredTerms, Sides, sides, terms_of
 from shaftwork.equations.quantities import rate_of
-from shaftwork.lagrange.lagrange_equations import LagrangeEquations, MotionEquation, Square
 from shaftwork.latex.blocks import Block, Blocks
 from shaftwork.latex.document import in_sections, section
 from shaftwork.latex.nomenclature import nomenclature, unit
 from shaftwork.latex.printing import Line
-from shaftwork.latex.sums import Sums
+from shaftwork.latex.shaft_blocks import Sums
+
+if TYPE_CHECKING:
+    from shaftwork.equations.second_order import Square
+    from shaftwork.lagrange.lagrange import Lagrangian, MotionEquation
 
 KINETIC, POTENTIAL, LOSS = "E_k", "E_p", r"\mathcal{R}"
 """Letters of the energies, after Abdelkader 2016, (19), and of Rayleigh's function."""
 
 
-def document(lagrangian: LagrangeEquations, *, values: bool) -> str:
+def document(lagrangian: Lagrangian, *, values: bool) -> str:
     """A LaTeX document that compiles as it is."""
     coordinates = {symbol.name: "coordinate" for symbol in lagrangian.coordinates}
     energies = {
@@ -37,7 +41,7 @@ def document(lagrangian: LagrangeEquations, *, values: bool) -> str:
     return in_sections(lagrangian.kirchhoff, sections)
 
 
-def _names(lagrangian: LagrangeEquations) -> set[str]:
+def _names(lagrangian: Lagrangian) -> set[str]:
     """The names of all symbols in the equations; of a rate, of that of which it is the rate as well."""
     rows = (*lagrangian.equations, *lagrangian.constraints)
     positions = {rate_of(symbol): symbol for symbol in (*lagrangian.motion, *lagrangian.prescribed)}
@@ -51,14 +55,14 @@ def _names(lagrangian: LagrangeEquations) -> set[str]:
     return {symbol.name for symbol in symbols | {positions[rate] for rate in symbols & positions.keys()}}
 
 
-def blocks_of(lagrangian: LagrangeEquations, *, values: bool) -> tuple[Block, ...]:
+def blocks_of(lagrangian: Lagrangian, *, values: bool) -> tuple[Block, ...]:
     """The blocks that say anything."""
     blocks = _LagrangeBlocks(lagrangian, Blocks(lagrangian.kirchhoff, values)).printed()
     return tuple(block for block in blocks if block.lines)
 
 
 class _LagrangeBlocks:
-    def __init__(self, lagrangian: LagrangeEquations, blocks: Blocks) -> None:
+    def __init__(self, lagrangian: Lagrangian, blocks: Blocks) -> None:
         self.lagrangian, self.blocks, self.writer = lagrangian, blocks, blocks.writer
         self.graph = blocks.equations.form.graph
         self.quantities = blocks.equations.assembly.quantities

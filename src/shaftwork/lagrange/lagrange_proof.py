@@ -16,16 +16,19 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 from sympy import Add, Dummy, Expr, Float, Integer, Poly, Symbol, cancel, expand, fraction, together
 from sympy.core.function import Application
 
 from shaftwork.equations.coordinates import coordinates
+from shaftwork.equations.kirchhoff import Row
 from shaftwork.equations.quantities import rate_of
-from shaftwork.equations.rows import Row
 from shaftwork.formulation.gains import exactly, in_decimals
-from shaftwork.lagrange.lagrange_equations import LagrangeEquations
 from shaftwork.network.graph import GROUND
+
+if TYPE_CHECKING:
+    from shaftwork.lagrange.lagrange import Lagrangian
 
 CLOSE = 1e-8
 """A ratio solved for is the given one within this: ratios are typed to some ten digits."""
@@ -102,7 +105,7 @@ def _bracketed(factor: Expr) -> str:
     return str(factor) if factor.is_Symbol else f"({factor})"
 
 
-def prove(lagrangian: LagrangeEquations) -> Proof:
+def prove(lagrangian: Lagrangian) -> Proof:
     """Compare every equation of Kirchhoff's with Lagrange's."""
     comparisons, name = _Comparisons(lagrangian), lagrangian.kirchhoff.form.graph.name
     left = len(lagrangian.kirchhoff.nodes) - len(lagrangian.equations)
@@ -110,7 +113,7 @@ def prove(lagrangian: LagrangeEquations) -> Proof:
 
 
 class _Comparisons:
-    def __init__(self, lagrangian: LagrangeEquations) -> None:
+    def __init__(self, lagrangian: Lagrangian) -> None:
         self.lagrangian, self.kirchhoff = lagrangian, lagrangian.kirchhoff
         self.quantities = self.kirchhoff.assembly.quantities
         self.motion = dict(lagrangian.motion)

@@ -8,21 +8,24 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import zip_longest
+from typing import TYPE_CHECKING
 
 from sympy import Add, Expr, Float, Integer, Symbol, preorder_traversal
 
 from shaftwork.core.domains import ELECTRICAL, ROTATION, TRANSLATION
 from shaftwork.core.errors import CompileError
 from shaftwork.equations.assembly import FactoredTerms, Sides, sides, terms_of, tidy
-from shaftwork.equations.fields import fields_of
 from shaftwork.equations.notations import in_letters
 from shaftwork.equations.quantities import ThroughQuantity, rate_of
-from shaftwork.equations.rows import Eliminated, NetworkEquations, Row, StateEquation
 from shaftwork.equations.second_order import SecondOrder
+from shaftwork.equations.spelling import INDEX_CLOSES, INDEX_OPENS, in_text
 from shaftwork.latex.printing import LINE_WIDTH, Line, Writer, printed_width, with_rates
-from shaftwork.latex.spelling import INDEX_CLOSES, INDEX_OPENS, in_text
-from shaftwork.latex.sums import MEANING, WEIGHTS, Sums, sums_of
+from shaftwork.latex.shaft_blocks import MEANING, WEIGHTS, Sums, lines_of_field, sums_of
 from shaftwork.network.kinds import Kind
+
+if TYPE_CHECKING:
+    from shaftwork.equations.kirchhoff import Eliminated, Row, StateEquation
+    from shaftwork.equations.records import Equations
 
 AUXILIARY = (r"\sigma", r"\zeta", r"\xi", r"\chi")
 """Letters for sums that occur more than once in a law, such as a slip."""
@@ -51,7 +54,7 @@ class Blocks:
         values: print the parameters' values instead of their symbols.
     """
 
-    equations: NetworkEquations
+    equations: Equations
     values: bool
 
     def kirchhoff(self, *, twists: bool = True) -> Iterator[Block]:
@@ -138,10 +141,10 @@ class Blocks:
         yield Block("Equations of motion", lines)
         flows = self.equations.assembly.quantities.flows
         by_symbol = [flow for flow in flows if self.equations.assembly.quantities.through(flow) in form.laws]
-        laws = [line for flow in by_symbol for line in self.law(flow, form.across)]
+        laws = [line for flow in by_symbol for line in self.law(flow, form.at.motion)]
         assembly = self.equations.assembly
         for end, other in assembly.opposite.items():
-            across = assembly.quantities.across(assembly.ends(other)).xreplace(form.across)
+            across = assembly.quantities.across(assembly.ends(other)).xreplace(form.at.motion)
             laws.append(self.writer.line(assembly.law_of_history(end, across)))
         yield Block("where", tuple(laws), r"Angles are counted from the untwisted position.")
 
@@ -151,10 +154,10 @@ class Blocks:
         Raises:
             CompileError: there are none.
         """
-        if not (fields := fields_of(self.equations)):
+        if not self.equations.fields:
             raise CompileError(f"'{self.equations.form.graph.name}' has no Shaft. Take form='state'.")
-        for field in fields:
-            along, boundary, definitions = field.lines(values=self.values)
+        for field in self.equations.fields:
+            along, boundary, definitions = lines_of_field(field, values=self.values)
             yield Block(f"Along {in_text(field.part.name)}", along)
             yield Block("At its ends", boundary)
             yield Block("Derived quantities", definitions)
@@ -319,7 +322,7 @@ def _shared_sums(terms: tuple[Expr, ...], owner: str) -> tuple[tuple[tuple[Symbo
     return tuple(shared), terms
 
 
-def _dotted(equations: NetworkEquations) -> dict[str, str]:
+def _dotted(equations: Equations) -> dict[str, str]:
     """Rates of angles and positions with dots, as the second-order form has them."""
     quantities, names = equations.assembly.quantities, equations.symbol_names
     dotted: dict[str, str] = {}

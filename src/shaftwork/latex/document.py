@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 from shaftwork.core.errors import CompileError, ShaftworkError
 from shaftwork.equations.quantities import INSTEAD
-from shaftwork.equations.rows import NetworkEquations
+from shaftwork.equations.spelling import in_text, without_marks
 from shaftwork.latex.blocks import Block, Blocks
 from shaftwork.latex.nomenclature import nomenclature
 from shaftwork.latex.printing import aligned
 from shaftwork.latex.series import shortened
-from shaftwork.latex.spelling import in_text, without_marks
+
+if TYPE_CHECKING:
+    from shaftwork.equations.records import Equations
 
 Form = Literal["kirchhoff", "state", "second-order", "field"]
 PREAMBLE = r"""\documentclass[11pt,a4paper]{article}
@@ -36,12 +38,12 @@ BEGIN = r"""\date{}
 \maketitle"""
 
 
-def typeset(equations: NetworkEquations, blocks: Iterable[Block]) -> str:
+def typeset(equations: Equations, blocks: Iterable[Block]) -> str:
     """Blocks for a document, below the phase for which they hold."""
     return "\n".join(("\\allowdisplaybreaks", *_phase(equations), *map(_paragraph, blocks)))
 
 
-def _phase(equations: NetworkEquations) -> tuple[str, ...]:
+def _phase(equations: Equations) -> tuple[str, ...]:
     """The modes for which the equations hold, under a heading; nothing where no part changes its mode."""
     return (f"\\paragraph{{Phase}}\\mbox{{}}\n{in_text(equations.phase)}",) if equations.phase else ()
 
@@ -50,13 +52,13 @@ def _paragraph(block: Block) -> str:
     return f"\\paragraph{{{block.heading}}}\\mbox{{}}\n{_content(block)}"
 
 
-def rendered(equations: NetworkEquations, blocks: Iterable[Block]) -> str:
+def rendered(equations: Equations, blocks: Iterable[Block]) -> str:
     """Blocks for a notebook, below the phase for which they hold."""
     phase = (f"$\\textbf{{Phase}}$ {in_text(equations.phase)}\n",) if equations.phase else ()
     return "\n".join((*phase, *(f"$\\textbf{{{block.heading}}}$\n{_content(block)}" for block in blocks)))
 
 
-def blocks_of(equations: NetworkEquations, form: Form | None, *, values: bool) -> tuple[Block, ...]:
+def blocks_of(equations: Equations, form: Form | None, *, values: bool) -> tuple[Block, ...]:
     """The blocks that say anything: of one form, or of Kirchhoff's equations and the state form.
 
     Raises:
@@ -93,7 +95,7 @@ def _content(block: Block) -> str:
     return f"{remark}\\begin{{align*}}\n{rows}\n\\end{{align*}}"
 
 
-def document(equations: NetworkEquations, form: Form | None, *, values: bool) -> str:
+def document(equations: Equations, form: Form | None, *, values: bool) -> str:
     """A LaTeX document that compiles as it is, of one form or of all."""
     blocks = Blocks(equations, values)
     states = {state.name: "state" for state in equations.form.states}
@@ -124,7 +126,7 @@ def joined(documents: Sequence[str]) -> str:
     return f"{head}{begin}{bodies}{end}"
 
 
-def in_sections(equations: NetworkEquations, sections: Mapping[str, str]) -> str:
+def in_sections(equations: Equations, sections: Mapping[str, str]) -> str:
     """A LaTeX document of sections that say anything, after the phase and before remarks."""
     remarks = "\n\n".join(in_text(note) for note in equations.notes)
     whole = {"Phase": in_text(equations.phase), **sections, "Remarks": remarks}

@@ -5,16 +5,19 @@ from __future__ import annotations
 import re
 from collections.abc import Container, Iterator, Mapping, Sequence
 from itertools import zip_longest
+from typing import TYPE_CHECKING
 
 from sympy import Basic
 
 from shaftwork.components.tables import Table
 from shaftwork.equations.notations import Letter
-from shaftwork.equations.rows import NetworkEquations
+from shaftwork.equations.spelling import INDEX_CLOSES, INDEX_OPENS, in_text, split_index, without_marks
 from shaftwork.latex.printing import Writer, printed_number
 from shaftwork.latex.series import Numbers, listed, replaced, series_in
-from shaftwork.latex.spelling import INDEX_CLOSES, INDEX_OPENS, in_text, split_index, without_marks
 from shaftwork.network.graph import effective
+
+if TYPE_CHECKING:
+    from shaftwork.equations.records import Equations
 
 LAWS = "Formula, or points of a table, over $t$ in s if nothing else is said"
 ALL_DIGITS = 15
@@ -26,7 +29,7 @@ Cells = tuple[str, ...]
 
 
 def nomenclature(
-    equations: NetworkEquations, used: Container[str], noted: Mapping[str, str], besides: Sequence[Cells] = ()
+    equations: Equations, used: Container[str], noted: Mapping[str, str], besides: Sequence[Cells] = ()
 ) -> str:
     """The tables of the variables that equations contain, of the parameters, and of the laws that are given.
 
@@ -65,7 +68,7 @@ def nomenclature(
     return "\n".join(filter(None, tables))
 
 
-def _laws(equations: NetworkEquations) -> Iterator[Cells]:
+def _laws(equations: Equations) -> Iterator[Cells]:
     """Rows of the laws that are given as tables or formulas."""
     writer = Writer({}, (), (), {})
     for part in equations.form.graph.parts:

@@ -14,7 +14,7 @@ from sympy.printing.latex import LatexPrinter
 from shaftwork.components.laws import t as TIME
 from shaftwork.equations.assembly import FactoredTerms, Sides, rising_first
 from shaftwork.equations.quantities import rate_of
-from shaftwork.latex.spelling import without_marks
+from shaftwork.equations.spelling import without_marks
 
 LINE_WIDTH = 76
 """Characters of ordinary width that fit on a printed line beside its left side."""

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from shaftwork.equations.spelling import INDEX_CLOSES, INDEX_OPENS
 from shaftwork.latex.printing import Line
-from shaftwork.latex.spelling import INDEX_CLOSES, INDEX_OPENS
 
 SHORTEST_SERIES = 5
 """Fewer equal rows are printed one by one."""

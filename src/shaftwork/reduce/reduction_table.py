@@ -15,10 +15,10 @@ from shaftwork.components.tables import Table
 from shaftwork.core.errors import SignalError
 from shaftwork.core.screen import in_columns
 from shaftwork.equations.assembly import FactoredTerms
+from shaftwork.equations.spelling import escaped, in_text, without_marks
 from shaftwork.latex.nomenclature import column, unit
 from shaftwork.latex.nomenclature import table as longtable
 from shaftwork.latex.printing import Line, Writer, aligned, printed_number, printed_width
-from shaftwork.latex.spelling import escaped, in_text, without_marks
 from shaftwork.reduce.referred_parts import Entry
 
 HEADINGS = ("part", "quantity", "value", "unit", "ratio", "referred", "unit", "formula")

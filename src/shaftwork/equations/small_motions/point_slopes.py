@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from sympy import Expr, Float, Integer, Rational, Symbol
 
@@ -14,11 +14,13 @@ from shaftwork.components.law_slopes import jumps, slope
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ParameterError, no_quantity
 from shaftwork.equations.quantities import Quantities, is_rate
-from shaftwork.equations.rows import NetworkEquations
 from shaftwork.formulation.form import Names
 from shaftwork.network.controlled import readings_of
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch
 from shaftwork.network.kinds import Kind
+
+if TYPE_CHECKING:
+    from shaftwork.equations.records import Equations
 
 VARIED = Symbol("varied", real=True)
 """Stands for what a law that jumps reads."""
@@ -114,9 +116,7 @@ class PointValues:
         ParameterError: there is no such parameter or quantity.
     """
 
-    def __init__(
-        self, equations: NetworkEquations, parameters: Values | None, at: Values | None, t: float | None
-    ) -> None:
+    def __init__(self, equations: Equations, parameters: Values | None, at: Values | None, t: float | None) -> None:
         graph = equations.form.graph
         values = {**graph.parameters, **_checked(graph, parameters or {})}
         self._parameters = {Symbol(name, real=True): Rational(float(value)) for name, value in values.items()}
@@ -126,7 +126,7 @@ class PointValues:
         self._point, self._at_rest = _Point(equations, at or {}), at is None
         self._time = {TIME: Rational(time)}
 
-    def with_slopes(self, slopes: Mapping[Symbol, Slope]) -> Mapping[Symbol, Rational]:
+    def with_slopes(self, slopes: Mapping[Symbol, Slope]) -> dict[Symbol, Rational]:
         """The values of parameters, of what is derived from them, and of slopes of laws.
 
         Raises:
@@ -193,7 +193,7 @@ def _checked(graph: CircuitGraph, parameters: Values) -> Values:
     return parameters
 
 
-def _time(equations: NetworkEquations, values: Mapping[Symbol, Rational], at: Values | None) -> float:
+def _time(equations: Equations, values: Mapping[Symbol, Rational], at: Values | None) -> float:
     """A time in s after which no law switches any more; at rest, where parts change their mode, none has yet."""
     if any(part.modes for part in equations.form.graph.parts) and at is None:
         return 0.0
@@ -210,7 +210,7 @@ class _Point:
         ParameterError: there is no such quantity, or it is a product of others.
     """
 
-    def __init__(self, equations: NetworkEquations, at: Values) -> None:
+    def __init__(self, equations: Equations, at: Values) -> None:
         names, quantities = Names(equations.form), equations.assembly.quantities
         states = {state.name for state in equations.form.states}
         self._nodes, self._others = {GROUND: Rational(0)}, dict[Symbol, Rational]()

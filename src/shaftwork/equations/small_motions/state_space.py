@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from sympy import Add, Dummy, Expr, ImmutableMatrix, Integer, Symbol, cancel
+from sympy import Dummy, Expr, ImmutableMatrix, Integer, Symbol, cancel
 
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError, SignalError, no_quantity
-from shaftwork.equations.point_slopes import LawSlopes, Slope
-from shaftwork.equations.rows import NetworkEquations
-from shaftwork.equations.tableau import refuse_waves
+from shaftwork.equations.small_motions.point_slopes import LawSlopes, Slope
+from shaftwork.equations.small_motions.tableau import linear_form, with_laws
 from shaftwork.formulation.explicit_rows import BlockTooLargeError, explicit_rows
 from shaftwork.formulation.form import Names, StateForm
 from shaftwork.formulation.observables import Observables
 from shaftwork.formulation.source_inputs import places_of, source_inputs, with_inputs
-from shaftwork.network.graph import GraphBranch
-from shaftwork.network.kinds import Kind
+
+if TYPE_CHECKING:
+    from shaftwork.equations.records import Equations
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ class StateSpace:
 
 
 def state_space(
-    equations: NetworkEquations, inputs: str | Sequence[str] | None, outputs: str | Sequence[str] | None
+    equations: Equations, inputs: str | Sequence[str] | None, outputs: str | Sequence[str] | None
 ) -> StateSpace:
     """The matrices.
 
@@ -66,17 +66,16 @@ def state_space(
         SignalError: there is no such input or quantity.
         CompileError: a shaft is a travelling wave, or more rates are coupled than are solved in symbols.
     """
-    refuse_waves(equations.form)
     named = source_inputs(equations.form.graph) if inputs is None else _listed(inputs)
     slopes = LawSlopes(equations.assembly.quantities)
     places = places_of(equations.form.graph, named)
-    form, branches = with_inputs(_near(equations, slopes), places)
+    form, branches = with_inputs(linear_form(equations, slopes), places)
     values = [(Dummy(real=True), Dummy(real=True)) for _ in places]
     laws = {
         branch: place.signal.sign * (value + TIME * rate)
         for branch, place, (value, rate) in zip(branches, places, values, strict=True)
     }
-    form = _with_laws(form, laws)
+    form = with_laws(form, laws)
     try:
         rows = explicit_rows(form)
     except BlockTooLargeError:
@@ -96,33 +95,6 @@ def state_space(
 
 def _listed(names: str | Sequence[str]) -> tuple[str, ...]:
     return (names,) if isinstance(names, str) else tuple(names)
-
-
-def _near(equations: NetworkEquations, slopes: LawSlopes) -> StateForm:
-    """The form with laws by their slopes, in letters of the network, and sources at zero."""
-    quantities, laws = equations.assembly.quantities, dict[int, Expr]()
-    for branch in equations.form.graph.branches:
-        match branch.template.kind:
-            case Kind.THROUGH_SOURCE:
-                laws[branch.index] = Integer(0)
-            case Kind.LAW | Kind.ACROSS_SOURCE:
-                laws[branch.index] = Add(*(slope * by for by, slope in slopes.of(branch).items()))
-            case Kind.COUPLING:
-                pass
-            case _:
-                laws[branch.index] = quantities.own_law(branch.index)
-    return _with_laws(equations.form, laws)
-
-
-def _with_laws(form: StateForm, laws: Mapping[int, Expr]) -> StateForm:
-    """The form with other laws, in symbols of the network."""
-
-    def changed(branch: GraphBranch) -> GraphBranch:
-        template = dataclasses.replace(branch.template, law=laws[branch.index], symbols=())
-        return dataclasses.replace(branch, template=template)
-
-    branches = (changed(branch) if branch.index in laws else branch for branch in form.graph.branches)
-    return dataclasses.replace(form, graph=dataclasses.replace(form.graph, branches=tuple(branches)))
 
 
 def _quantity(form: StateForm, read: Observables, name: str) -> Expr:

@@ -5,36 +5,38 @@ They are quotients of two determinants of the tableau, by Cramer's rule; compute
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from mpmath import mpf, polyroots, workdps
 from numpy.typing import NDArray
-from sympy import Add, Expr, Float, Integer, Poly, Rational, Symbol, default_sort_key
+from sympy import QQ, QQ_I, Add, Expr, Float, Integer, Poly, Rational, Symbol
+from sympy.polys.densetools import dup_eval
 
 from shaftwork.core.errors import CompileError, ParameterError, SignalError, no_quantity
-from shaftwork.equations.assembly import FactoredTerms
-from shaftwork.equations.cramer import TooManyTermsError, in_numbers, quotient
-from shaftwork.equations.notations import QUANTITIES
-from shaftwork.equations.point_slopes import FRACTION_DIGITS, LawSlopes, PointValues, Slope, Values
-from shaftwork.equations.rows import NetworkEquations
-from shaftwork.equations.tableau import S, Sum, Tableau, refuse_waves
+from shaftwork.equations.small_motions.point_slopes import FRACTION_DIGITS, LawSlopes, PointValues, Slope, Values
+from shaftwork.equations.small_motions.tableau import (
+    INPUT,
+    S,
+    Tableau,
+    TooManyTermsError,
+    in_numbers,
+    linear_form,
+    quotient,
+    with_laws,
+)
 from shaftwork.formulation.form import Names
 from shaftwork.formulation.gains import LONGEST
-from shaftwork.formulation.source_inputs import Place, places_of
-from shaftwork.latex.blocks import Blocks
-from shaftwork.latex.printing import LINE_WIDTH, Line, Writer, aligned, printed_width
-from shaftwork.latex.spelling import escaped, without_marks
+from shaftwork.formulation.source_inputs import places_of, with_inputs
+
+if TYPE_CHECKING:
+    from shaftwork.equations.records import Equations
 
 STEPS, EXTRA = 1000, 10
 """Steps in which roots are improved, and the binary digits more for each of them: what cancels in a polynomial."""
-
-REAL = Symbol("s", real=True)
-"""Stands for s in print, where all letters are real."""
 
 Complex = NDArray[np.complex128]
 
@@ -60,7 +62,7 @@ class TransferFunction:
     numerator: Poly
     denominator: Poly
     slopes: Mapping[Symbol, Slope]
-    equations: NetworkEquations
+    equations: Equations
     s = S
 
     @cached_property
@@ -148,7 +150,9 @@ class TransferFunction:
 
     def latex(self) -> str:
         """The equation for a LaTeX document (needs amsmath), and below it what the letters of slopes stand for."""
-        return f"\\begin{{align*}}\n{without_marks(aligned(tuple(_lines(self))))}\n\\end{{align*}}"
+        from shaftwork.latex.quotients import typeset_quotient
+
+        return typeset_quotient(self)
 
     _repr_latex_ = latex
 
@@ -161,7 +165,7 @@ class TransferFunction:
 
 
 def transfer_function(
-    equations: NetworkEquations, names: tuple[str, str], *, values: bool, at: Values | None, t: float | None
+    equations: Equations, names: tuple[str, str], *, values: bool, at: Values | None, t: float | None
 ) -> TransferFunction:
     """The transfer function from an input to a quantity.
 
@@ -177,17 +181,18 @@ def transfer_function(
         CompileError: a shaft is a travelling wave; the network is too large for symbols; or it has several motions.
         ParameterError: with values, `at` names no quantity, or a law has no finite slope there.
     """
-    refuse_waves(equations.form)
     if not values and (at is not None or t is not None):
         raise ParameterError("at and t put numbers in. Take values=True, or numeric(at=...) of what this makes.")
-    (place,) = places_of(equations.form.graph, names[:1])
     slopes = LawSlopes(equations.assembly.quantities)
-    tableau = Tableau(equations.assembly, slopes)
-    read, direct = _output(equations, tableau, place, names[1])
+    linear = linear_form(equations, slopes)
+    places = places_of(equations.form.graph, names[:1])
+    form, (branch,) = with_inputs(linear, places)
+    tableau = Tableau(with_laws(form, {branch: places[0].signal.sign * INPUT}))
+    read = tableau.sum(_output(equations, tableau, names[1]))
     rows = tableau.rows(read)
     numbers = PointValues(equations, None, at, t).with_slopes(slopes.letters) if values else None
     try:
-        above, below = quotient(rows, tableau.entered(place), (read, direct), numbers)
+        above, below = quotient(rows, read, numbers)
     except TooManyTermsError:
         raise CompileError(
             "The network has too many loops for determinants in numbers. Take frequency_response."
@@ -205,44 +210,35 @@ def transfer_function(
     return TransferFunction(*names, Poly(above.as_expr(), S), Poly(below.as_expr(), S), standing, equations)
 
 
-def _output(equations: NetworkEquations, tableau: Tableau, place: Place, name: str) -> tuple[Sum, int]:
-    """A quantity as a sum of unknowns, and what the input itself adds to it.
+def _output(equations: Equations, tableau: Tableau, name: str) -> Expr:
+    """A quantity in unknowns.
 
     Raises:
         SignalError: there is no such quantity, or it is a power or an energy.
     """
-    names, graph = Names(equations.form), equations.form.graph
+    names, states = Names(equations.form), equations.form.states
     if name in names.signals:
-        part, signal = names.signals[name]
-        direct = 0
-        if signal.kind == "through" and place.branch < 0 and part.name == graph.parts[place.part].name:
-            first, second = place.signal.ends
-            direct = signal.sign * place.signal.sign * ((first == signal.ends[0]) - (second == signal.ends[0]))
-        return tableau.signal(part, signal), direct
+        return tableau.signal(*names.signals[name])
     if name in names.integrals:
-        return tableau.integral(graph.branches[equations.form.states[names.integrals[name]].branch]), 0
+        return tableau.integral(states[names.integrals[name]].branch)
     if name in names.nodes:
-        return tableau.node(names.nodes[name]), 0
+        return tableau.quantities.node(names.nodes[name])
     if name in names.units:
         raise SignalError(f"'{name}' is a product of speeds and torques: it has no transfer function.")
-    raise no_quantity(name, graph.name, names.units)
+    raise no_quantity(name, equations.form.graph.name, names.units)
 
 
 def _divided(above: Poly, below: Poly, s: complex) -> complex:
     """A quotient at a complex number: exact but for the last division."""
-    (a, b), (c, d) = (_at(polynomial.all_coeffs(), s) for polynomial in (above, below))
-    size = c * c + d * d
-    if not size:
+    at = QQ_I(*(QQ(*part.as_integer_ratio()) for part in (s.real, s.imag)))
+    numerator, denominator = (
+        dup_eval([QQ_I(QQ(int(c.p), int(c.q)), 0) for c in polynomial.all_coeffs()], at, QQ_I)
+        for polynomial in (above, below)
+    )
+    if not denominator:
         raise ParameterError(f"s = {s:g} is a pole.")
-    return complex(float((a * c + b * d) / size), float((b * c - a * d) / size))
-
-
-def _at(coefficients: Iterable[Rational], s: complex) -> tuple[Fraction, Fraction]:
-    real, imaginary = Fraction(s.real), Fraction(s.imag)
-    x, y = Fraction(0), Fraction(0)
-    for c in coefficients:
-        x, y = x * real - y * imaginary + Fraction(int(c.p), int(c.q)), x * imaginary + y * real
-    return x, y
+    quotient = numerator / denominator
+    return complex(float(quotient.x), float(quotient.y))
 
 
 def _roots(polynomial: Poly) -> Complex:
@@ -274,60 +270,3 @@ def _readable(polynomial: Poly, first: Expr) -> Expr:
 def _rounded(coefficient: Expr) -> Expr:
     long = (number for number in coefficient.atoms(Rational) if number.q > LONGEST or abs(number.p) > LONGEST**2)
     return coefficient.xreplace({number: Float(number) for number in long})
-
-
-def _lines(function: TransferFunction) -> Iterator[Line]:
-    equations = function.equations
-    names, blocks = equations.symbol_names, Blocks(equations, values=False)
-    letters = _letters(function.slopes, set(names.values()))
-    printed = {**names, **letters, REAL.name: "s"}
-    writer = Writer(printed, {*equations.values, *letters}, (), {}, equations.inverses)
-    above, below = (writer.pieces(_powers(polynomial)) for polynomial in function.printed)
-    left = rf"\frac{{{_named(function.output, names)}}}{{{_named(function.input, names)}}}"
-    if 1.5 * max(printed_width(" ".join(pieces)) for pieces in (above, below)) < LINE_WIDTH:
-        yield Line(left, (rf"\frac{{{' '.join(above)}}}{{{' '.join(below)}}}",))
-    else:
-        yield Line(left, (r"\frac{Z(s)}{N(s)}",))
-        yield Line("Z(s)", above)
-        yield Line("N(s)", below)
-    for letter, slope in function.slopes.items():
-        yield Line(letters[letter.name], _derivative(slope, blocks.writer))
-
-
-def _named(name: str, names: Mapping[str, str]) -> str:
-    """The letter of a quantity, "line.tau_a" as tau with the name of its part, where no equation has one for it."""
-    part, _, quantity = name.rpartition(".")
-    stem, _, end = quantity.partition("_")
-    index = rf"\mathrm{{{escaped(part)}}}{f',{escaped(end)}' if end else ''}"
-    letter = QUANTITIES[stem].latex if stem in QUANTITIES else stem
-    return names.get(name, rf"{letter}_{{{index}}}")
-
-
-def _letters(slopes: Mapping[Symbol, Slope], taken: set[str]) -> dict[str, str]:
-    """A letter for each slope, with the name of its part: k, or another where the part has one."""
-    letters: dict[str, str] = {}
-    for symbol, slope in slopes.items():
-        number = symbol.name.partition("(")[0].partition("_")[2]
-        index = rf"\mathrm{{{escaped(slope.part)}}}{f',{number}' if number else ''}"
-        options = (rf"{base}_{{{index}}}" for base in ("k", r"\kappa", r"\lambda"))
-        whole = rf"\mathrm{{{escaped(symbol.name)}}}"
-        letters[symbol.name] = next((text for text in options if text not in taken), whole)
-    return letters
-
-
-def _powers(polynomial: Expr) -> list[FactoredTerms]:
-    """The terms of a polynomial in s, the highest power first."""
-    powers: dict[int, list[Expr]] = {}
-    for term in sorted(Add.make_args(polynomial.expand()), key=default_sort_key):  # else each process has its order
-        coefficient, power = term.as_independent(S)
-        powers.setdefault(int(power.as_base_exp()[1]) if power != 1 else 0, []).append(coefficient)
-    return [FactoredTerms(REAL**power, tuple(terms)) for power, terms in sorted(powers.items(), reverse=True)]
-
-
-def _derivative(slope: Slope, writer: Writer) -> tuple[str, ...]:
-    """How a torque changes with what its law reads, or the slope in full where the torque is no quantity by itself."""
-    sign, letter = slope.of.as_coeff_Mul()
-    if not (letter.is_Symbol and slope.by.is_Symbol):
-        return writer.pieces([FactoredTerms(Integer(1), Add.make_args(slope.value))])
-    minus = "-" if sign < 0 else ""
-    return (rf"{minus}\frac{{\partial {writer.latex(letter)}}}{{\partial {writer.latex(slope.by)}}}",)

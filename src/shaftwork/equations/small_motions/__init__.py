@@ -1,0 +1,1 @@
+"""Small motions about a point: transfer functions and state matrices in symbols."""
