@@ -4,36 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from weakref import WeakKeyDictionary
 
-import numpy as np
-
-from shaftwork.codegen.array_form.elements import Array
-from shaftwork.codegen.starts.start_values import initial_state
-from shaftwork.codegen.state_transfer import StateTransfer
-from shaftwork.core.errors import AccuracyWarning, Diagnostic, NetworkWarning, ParameterError
+from shaftwork.core.errors import Diagnostic, NetworkWarning, ParameterError
 from shaftwork.core.notices import warn
 from shaftwork.core.parameters import in_si
 from shaftwork.network.checks import resting_trains
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.wording import first_few, listed
-from shaftwork.pipeline.prepared import EngineModel, Prepared
 from shaftwork.results.solution import Solution
-
-if TYPE_CHECKING:
-    from shaftwork.waves.wave_motion import CarriedWaves, WaveStart
 
 _RESTING: WeakKeyDictionary[CircuitGraph, tuple[Diagnostic, ...]] = WeakKeyDictionary()
 """What `resting_trains` gives: it takes as long as a short run."""
 SAME_TIME = 1e-12
 """Times that differ by less than this fraction are one: units are converted."""
-
-
-def waving(graph: CircuitGraph) -> tuple[str, ...]:
-    """Names of the parts that waves travel along."""
-    histories = (branch.index for branch in graph.branches if branch.template.is_history)
-    return tuple(dict.fromkeys(graph.part_of(index).name for index in histories))
 
 
 class Ending(dict[str, float]):
@@ -55,7 +40,7 @@ class Ending(dict[str, float]):
         read: float,
         modes: Mapping[str, str],
         parameters: Mapping[str, float],
-        waves: CarriedWaves | None,
+        waves: object,
     ) -> None:
         super().__init__(stored)
         self.t, self.read, self.modes, self.parameters, self.waves = t, read, dict(modes), dict(parameters), waves
@@ -121,7 +106,7 @@ def ending_of(motion: Solution, graph: CircuitGraph) -> Ending:
         )
     t, x = float(motion.t[-1]), motion.x[-1]
     observer, carried = motion.observer, getattr(motion.dense, "carried", None)
-    waves = carried(t) if waving(graph) and carried is not None else None
+    waves = None if carried is None else carried(t)
     return Ending(observer.held(t, x), t, observer.read_at(t), observer.modes_at(t), motion.parameters, waves)
 
 
@@ -167,73 +152,3 @@ def warn_of_rest(graph: CircuitGraph, initial: Mapping[str, float]) -> None:
     for train in resting:
         if moved.isdisjoint((*train.parts, *train.nodes)):
             warn(f"'{graph.name}' has a train that stays at rest: {train}", NetworkWarning)
-
-
-def start_of(
-    model: EngineModel, prepared: Prepared, initial: Mapping[str, float] | None, span: tuple[float, float]
-) -> tuple[Array, WaveStart | CarriedWaves | None]:
-    """The states (n,) at the start, and the waves where they are not at rest.
-
-    Args:
-        model: the compiled equations.
-        prepared: their parameters.
-        initial: start values, or where another motion ended; None for rest.
-        span: start and end of the run, s.
-
-    Raises:
-        SignalError: there is no such quantity.
-        ParameterError: values are not finite, contradict each other or leave something open.
-    """
-    if initial is None and not model.form.has_impulses:
-        return np.zeros(len(model.states)), None
-    _, after = model.switching.timeline(prepared.p, *span).sides(span[0])
-    values = dict(zip(model.parameters, prepared.p.tolist(), strict=True))
-    if isinstance(initial, Ending) and (initial.waves is not None or not model.form.waves):
-        return _taken_up(prepared, initial, after, changes=bool(initial.changed(values))), initial.waves
-    if not model.form.waves:
-        return initial_state(prepared.bound, {} if initial is None else initial, after), None
-    from shaftwork.waves.wave_motion import start_of_waves
-
-    if isinstance(initial, Ending):
-        warn_of_lost_waves(span[0], in_leaps=True)
-        initial = {name: initial[name] for name in model.states}
-    elif initial and span[0] != 0:
-        warn_of_lost_waves(span[0])
-    return start_of_waves(prepared.bound, model.twin.bind(model.twin.vector(values)), initial or {}, after)
-
-
-def _taken_up(prepared: Prepared, ending: Ending, after: float, *, changes: bool) -> Array:
-    """The states (n,) that go on with what was stored, after what jumps at that instant.
-
-    Args:
-        prepared: the equations.
-        ending: of the motion before.
-        after: time at which inputs are read from now on, s.
-        changes: whether a parameter is another one: what is rigidly joined may then have to change its speeds at once.
-    """
-    form, bound, stores = prepared.form, prepared.bound, StateTransfer(prepared.form)
-    if changes:
-        ending.refuse_lacking(stores.names)
-        x = stores.states(bound, ending.read, ending)
-    else:  # without the full matrices of all stores, which a large network has no room for
-        ending.refuse_lacking(state.name for state in form.states)
-        x = np.array([ending[state.name] for state in form.states])
-    return bound.impulse(x, ending.read, after) if form.has_impulses and after != ending.read else x
-
-
-def warn_of_lost_waves(t_start: float, *, in_leaps: bool = False) -> None:
-    """Warn of a motion that goes on at a time in s without what was on its way.
-
-    Args:
-        t_start: the time, s.
-        in_leaps: whether the motion before is known and has leapt through its waves; else only start values are.
-    """
-    why, remedy = "start values tell of their ends alone", "Give the motion itself, initial=sol"
-    if in_leaps:
-        why, remedy = "a long run leaps from one output time to the next", "Simulate it with t_eval='steps'"
-    warn(
-        f"The motion goes on at t_start = {t_start:g} s without the waves that were on their way through shafts: "
-        f"{why}, and the torque of a shaft begins as in steady operation. {remedy}; or simulate all of it in one run, "
-        "or take another model of the shaft, such as Lumped(20).",
-        AccuracyWarning,
-    )

@@ -13,8 +13,7 @@ from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
 from shaftwork.pipeline.network import Network, network_of
 from shaftwork.reduce.kinematics import Kinematics, Scale, kinematics
-from shaftwork.reduce.reduction_table import ReductionTable
-from shaftwork.reduce.referred_parts import ReferredPart, referred_part
+from shaftwork.reduce.referred_parts import ReductionTable, ReferredPart, referred_part
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,12 +19,12 @@ from shaftwork.core.errors import MissingExtraError, ParameterError, ShaftworkEr
 from shaftwork.core.files import replaced
 from shaftwork.core.screen import in_columns
 from shaftwork.integrate.engines import ENGINES, available
-from shaftwork.pipeline.arguments import NOMINAL
+from shaftwork.pipeline.arguments import NOMINAL, engine_names, several
 from shaftwork.pipeline.model import Model
 from shaftwork.results.observer import Array
 from shaftwork.studies.stability_cases import CASES, TORQUE, Case
 from shaftwork.studies.stability_truth import QUANTITIES, EndMotion, exact, predicted
-from shaftwork.studies.study_arguments import engine_names, several, shaft_models, text_of
+from shaftwork.studies.study_arguments import shaft_models, text_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

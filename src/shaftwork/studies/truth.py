@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import networkx as nx
 import numpy as np
@@ -21,13 +22,15 @@ from shaftwork.components.shaft_models import OneSpring, Rigid, ShaftModel, Spec
 from shaftwork.components.shafts import Shaft
 from shaftwork.components.sources import TorqueSource
 from shaftwork.core.errors import ParameterError, ShaftworkError
-from shaftwork.frequency.natural_modes import Modes
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
 from shaftwork.pipeline.network import Network
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
 from shaftwork.studies.exact_shafts.exact_motion import JunctionTorque, motion
 from shaftwork.studies.exact_shafts.line import Section, SectionLine
+
+if TYPE_CHECKING:
+    from shaftwork.frequency.natural_modes import Modes
 
 QUANTITIES = ("tau_a", "tau_b", "tau_mid", "omega_a", "omega_b")
 """What is compared: torque at both ends and in the middle, speed of both ends."""
