@@ -45,15 +45,18 @@ from shaftwork.pipeline.arguments import (
 from shaftwork.pipeline.implicit import IMPLICIT, PRESCRIBED, at_rest, solve_loops, start_of_loops
 from shaftwork.pipeline.motion_start import (
     Ending,
+    Repetition,
+    call_of,
     ending_of,
+    model_again,
     refuse_motion,
+    remember,
     time_of_start,
     warn_of_rest,
 )
 from shaftwork.pipeline.prepared import EngineModel, OperatingPoint, Prepared
 from shaftwork.pipeline.settled import SteadyState, refuse_moving, warn_of_earlier_levels
 from shaftwork.pipeline.sizes import in_its_size, with_accuracy
-from shaftwork.pipeline.stored import Repetition, call_of, model_again, remember
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:

@@ -1,18 +1,25 @@
-"""How a motion starts: at rest, from values by name, or where another motion ended, as if there had been no end."""
+"""How a motion starts: at rest, from values by name, or where another motion ended, as if there had been no end.
+
+And how one that was stored (pickled) is made again when it is needed, as compiled code cannot be stored: a model from
+its network and the options of its compilation, a motion from the call that led to it.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any
-from weakref import WeakKeyDictionary
+from weakref import WeakKeyDictionary, WeakValueDictionary
 
-from shaftwork.core.errors import Diagnostic, NetworkWarning, ParameterError
-from shaftwork.core.notices import warn
+from shaftwork.core.errors import AccuracyWarning, Diagnostic, NetworkWarning, ParameterError
+from shaftwork.core.notices import muted, warn
 from shaftwork.core.parameters import in_si
 from shaftwork.network.checks import resting_trains
 from shaftwork.network.graph import CircuitGraph
+from shaftwork.network.netlist import Netlist
 from shaftwork.network.wording import first_few, listed
+from shaftwork.pipeline.arguments import Demand
 from shaftwork.results.solution import Solution
 
 _RESTING: WeakKeyDictionary[CircuitGraph, tuple[Diagnostic, ...]] = WeakKeyDictionary()
@@ -152,3 +159,73 @@ def warn_of_rest(graph: CircuitGraph, initial: Mapping[str, float]) -> None:
     for train in resting:
         if moved.isdisjoint((*train.parts, *train.nodes)):
             warn(f"'{graph.name}' has a train that stays at rest: {train}", NetworkWarning)
+
+
+Rebuild = Callable[[Netlist], Any]
+"""Makes the model of a network."""
+_LIVING: WeakValueDictionary[tuple[Rebuild, Netlist], Any] = WeakValueDictionary()
+"""Models that have been stored or made again: all motions of one network that a process reads share one."""
+
+
+def remember(model: Any, rebuild: Rebuild) -> tuple[Rebuild, Netlist]:
+    """What a model is stored as."""
+    _LIVING[rebuild, model.netlist] = model
+    return rebuild, model.netlist
+
+
+def model_again(rebuild: Rebuild, netlist: Netlist) -> Any:
+    """The model of a network; its author has been warned when it was first made."""
+    model = _LIVING.get((rebuild, netlist))
+    if model is None:
+        with muted(NetworkWarning):
+            model = _LIVING[rebuild, netlist] = rebuild(netlist)
+    return model
+
+
+@dataclass(frozen=True, eq=False)
+class Repetition:
+    """The call that has led to a motion.
+
+    Args:
+        rebuild: makes the model again.
+        netlist: of which it is a motion.
+        options: of `Model.simulate`.
+        model: the model itself, where it is at hand.
+    """
+
+    rebuild: Rebuild
+    netlist: Netlist
+    options: Mapping[str, Any]
+    model: Any = None
+
+    def __call__(self) -> Solution:
+        """The motion, made again."""
+        model = self.model or model_again(self.rebuild, self.netlist)
+        with muted(NetworkWarning, AccuracyWarning):  # its author has seen them
+            motion: Solution = model.simulate(**self.options)
+            return motion
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        if self.model is not None:
+            remember(self.model, self.rebuild)
+        return Repetition, (self.rebuild, self.netlist, self.options)
+
+
+def call_of(
+    motion: Solution, demand: Demand, values: Mapping[str, float], initial: Mapping[str, Any] | None
+) -> dict[str, Any]:
+    """The arguments of `Model.simulate` that lead to a motion again, by the engine that was taken.
+
+    A motion through phases has an engine for each, which is chosen anew.
+    """
+    return {
+        "t_start": demand.span[0],
+        "t_end": demand.span[1],
+        "rtol": demand.rtol,
+        "atol": demand.atol,
+        "t_eval": "steps" if demand.t_eval is None else demand.t_eval.copy(),
+        "engine": demand.engine if motion.phases else motion.engine,
+        "max_steps": demand.max_steps,
+        "parameters": dict(values),
+        "initial": initial if initial is None or isinstance(initial, Ending) else dict(initial),
+    }
