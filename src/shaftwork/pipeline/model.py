@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -16,7 +17,7 @@ from shaftwork.codegen.starts.operating import steady_state
 from shaftwork.codegen.starts.start_values import initial_state, with_others
 from shaftwork.codegen.valueless import refuse_vanishing
 from shaftwork.core.calls import Callback
-from shaftwork.core.errors import ParameterError
+from shaftwork.core.errors import Diagnostic, ParameterError
 from shaftwork.core.kept import Kept
 from shaftwork.core.notices import PulsationWarning, muted
 from shaftwork.core.parameters import in_si
@@ -25,6 +26,7 @@ from shaftwork.formulation.form import StateForm
 from shaftwork.integrate import choice
 from shaftwork.integrate.engines import EngineName, available
 from shaftwork.integrate.problem import Problem, Trajectory
+from shaftwork.network.checks import resting_trains
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import (
     Demand,
@@ -152,11 +154,16 @@ class Model(EngineModel):
         wanted = relative_tolerance(rtol), atol, output_times(t_eval, *span), engine, step_limit(max_steps)
         demand = Demand(span, *wanted, told if progress else None)
         if initial is None or (isinstance(initial, Mapping) and not isinstance(initial, Ending)):
-            warn_of_rest(self.form.graph, initial or {})
+            warn_of_rest(self.name, self._resting, initial or {})
         motion = with_accuracy(told.of(lambda: self._motion(values, initial, demand)), demand)
         parameters = dict(zip(self.parameters, self.defaults.tolist(), strict=True)) | values
         again = Repetition(self._rebuild, self.netlist, call_of(motion, demand, values, initial), self)
         return replace(motion, parameters=parameters, initial=dict(initial or {}), rtol=demand.rtol, again=again)
+
+    @cached_property
+    def _resting(self) -> tuple[Diagnostic, ...]:
+        """Trains that nothing joins to the drive."""
+        return resting_trains(self.form.graph)
 
     def _motion(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
         prepared = self.prepare(self.vector(values) if values else self.defaults)

@@ -10,20 +10,17 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
-from weakref import WeakKeyDictionary, WeakValueDictionary
+from weakref import WeakValueDictionary
 
 from shaftwork.core.errors import AccuracyWarning, Diagnostic, NetworkWarning, ParameterError
 from shaftwork.core.notices import muted, warn
 from shaftwork.core.parameters import in_si
-from shaftwork.network.checks import resting_trains
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.netlist import Netlist
 from shaftwork.network.wording import first_few, listed
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.results.solution import Solution
 
-_RESTING: WeakKeyDictionary[CircuitGraph, tuple[Diagnostic, ...]] = WeakKeyDictionary()
-"""What `resting_trains` gives: it takes as long as a short run."""
 SAME_TIME = 1e-12
 """Times that differ by less than this fraction are one: units are converted."""
 
@@ -146,19 +143,18 @@ def refuse_motion(initial: Any, what: str) -> None:
         )
 
 
-def warn_of_rest(graph: CircuitGraph, initial: Mapping[str, float]) -> None:
+def warn_of_rest(name: str, resting: Iterable[Diagnostic], initial: Mapping[str, float]) -> None:
     """Warn of trains that nothing joins to the drive and that no start value moves.
 
     Args:
-        graph: the network.
+        name: of the network.
+        resting: these trains, as `resting_trains` finds them.
         initial: start values.
     """
     moved = {str(name).rpartition(".")[0] for name, value in initial.items() if value}
-    if (resting := _RESTING.get(graph)) is None:
-        resting = _RESTING[graph] = resting_trains(graph)
     for train in resting:
         if moved.isdisjoint((*train.parts, *train.nodes)):
-            warn(f"'{graph.name}' has a train that stays at rest: {train}", NetworkWarning)
+            warn(f"'{name}' has a train that stays at rest: {train}", NetworkWarning)
 
 
 Rebuild = Callable[[Netlist], Any]
