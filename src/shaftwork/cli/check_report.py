@@ -13,10 +13,6 @@ from scipy import sparse
 from shaftwork.codegen.compiled_model import CompiledModel
 from shaftwork.core.errors import SimulationError
 from shaftwork.core.screen import counted
-from shaftwork.frequency.eigenvalues import LARGEST_DENSE
-from shaftwork.frequency.natural_modes import natural_frequencies
-from shaftwork.hybrid.named_phases import whole_name
-from shaftwork.hybrid.phased_model import PhasedModel
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.network import Network
 
@@ -33,6 +29,8 @@ def structure_report(net: Network, model: Model, t_end: float) -> str:
 
 
 def _lines(net: Network, model: Model, t_end: float) -> Iterator[str]:
+    from shaftwork.frequency.eigenvalues import LARGEST_DENSE
+
     graph = model.form.graph
     counts = (len(graph.parts), "part"), (len(graph.nodes), "node"), (len(graph.branches), "branch")
     yield f"{net.name}: {', '.join(counted(number, what) for number, what in counts)}"
@@ -40,7 +38,8 @@ def _lines(net: Network, model: Model, t_end: float) -> Iterator[str]:
         yield f"  {problem.severity}: {problem}"
     if graph.zeros:
         yield f"left out, being zero: {_some(graph.zeros)}"
-    equations, when = (model.phase(whole_name(graph)), " in motion") if isinstance(model, PhasedModel) else (model, "")
+    equations, phase = _equations(model)
+    when = " in motion" if phase else ""
     yield f"states{when} ({len(equations.states)}): {_some(equations.states)}"
     dependent = [graph.part_of(k).name for k in (*model.form.dependent_across, *model.form.dependent_through)]
     if dependent:
@@ -48,23 +47,35 @@ def _lines(net: Network, model: Model, t_end: float) -> Iterator[str]:
     cost = equations.cost()
     yield f"right-hand side{when}: {cost.form} code, {cost.total} operations; {cost.entries} entries in the linear part"
     if 0 < len(equations.states) <= LARGEST_DENSE:
-        for point in _points(model, equations):
+        for point in _points(model, equations, phase):
             yield from _time_constants(*point)
     name, why = model.choose_engine(t_end)
     yield f"engine for {t_end:g} s: {name}, {why}"
 
 
-def _points(model: Model, equations: CompiledModel) -> Iterator[tuple[str, Sequence[str], NDArray[np.float64]]]:
+def _equations(model: Model) -> tuple[CompiledModel, str]:
+    """The equations, and their phase: where parts change their mode that in which nothing holds."""
+    if not model.phased:
+        return model, ""
+    from shaftwork.hybrid.named_phases import whole_name
+
+    phase = whole_name(model.form.graph)
+    return model.phase(phase), phase
+
+
+def _points(
+    model: Model, equations: CompiledModel, phase: str
+) -> Iterator[tuple[str, Sequence[str], NDArray[np.float64]]]:
     """Words, states and slopes at rest; where parts change their mode also of the phase in which nothing holds."""
-    graph, states = model.form.graph, equations.states
+    states = equations.states
     slopes = np.asarray(equations.jacobian(0.0, np.zeros(len(states))).toarray())
-    if not isinstance(model, PhasedModel):
+    if not phase:
         yield "at rest", states, slopes
         return
     with suppress(SimulationError):  # a law has no finite slope there, as those below say of the phase in motion
         rest = model.linearize()
         yield rest.title.removeprefix(model.name).strip(), rest.states, _dense(rest.A)
-    yield f"in motion ({whole_name(graph)})", states, slopes
+    yield f"in motion ({phase})", states, slopes
 
 
 def _dense(matrix: Any) -> NDArray[np.float64]:
@@ -79,7 +90,7 @@ def _time_constants(words: str, states: Sequence[str], jacobian: NDArray[np.floa
     eigenvalues: NDArray[np.complex128] = np.linalg.eigvals(jacobian).astype(complex)
     size = np.abs(eigenvalues)
     moving = eigenvalues[size > 1e-9 * size.max(initial=0.0)]
-    swings = np.unique(np.round(natural_frequencies(moving[moving.imag > 1e-9 * np.abs(moving)]), 12))
+    swings = np.unique(np.round(np.abs(moving[moving.imag > 1e-9 * np.abs(moving)]) / (2 * np.pi), 12))
     decays = np.sort(-1 / moving.real[moving.real < -1e-12 * np.abs(moving)])
     if swings.size:
         yield f"natural frequencies {words} ({swings.size}): {_some([f'{f:.5g}' for f in swings])} Hz"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -22,45 +22,36 @@ from shaftwork.frequency.natural_modes import Modes
 from shaftwork.frequency.point_speeds import as_multiple, speeds_to_give, warn_of_speeds_left, warn_of_turning_angles
 from shaftwork.network.kinds import Kind
 from shaftwork.network.wording import listed
-from shaftwork.pipeline.arguments import as_names
+from shaftwork.pipeline.arguments import Names, Point, Time, as_names
+from shaftwork.pipeline.prepared import OperatingPoint
 from shaftwork.pipeline.settled import SteadyState
 from shaftwork.results.solution import Solution
 
-Given = Mapping[str, float] | None
-Point = Given | Solution
-Names = str | Sequence[str] | None
-Time = float | None
 SmallMotions = Callable[[Point, Time, Names], LinearModel | ExactModel]
 """From a point, a time and names of inputs to the network near that point."""
 NAMED = 4
 """Values of a point that a title names."""
 
 
-def linearized(
-    model: CompiledModel, p: Array, at: Point, t: Time, settled: float, inputs: Names, outputs: Names
-) -> LinearModel:
+def linearized(name: str, point: OperatingPoint, at: Point, inputs: Names, outputs: Names) -> LinearModel:
     """The network near a point.
 
     Args:
-        model: the compiled model.
-        p: parameter vector.
-        at: speeds, twists and torques at the point, what is not named at rest; or a motion at one time; None for rest.
-        t: time at which the laws are read, s; None for that of the motion or steady state, or else `settled`.
-        settled: a time after which no law switches any more, s.
+        name: of the network.
+        point: the equations that hold there, and where it is.
+        at: the point as it was given.
         inputs: names; None for all sources.
         outputs: names; None for the states.
 
     Raises:
-        ParameterError: the point is none.
-        SignalError: there is no such quantity.
-        SimulationError: a law has no finite slope at the point, or a shaft is a wave.
+        SignalError: there is no such input or output.
+        SimulationError: a law has no finite slope at the point.
     """
-    named = input_names(model, inputs)
-    point = None if model.form.waves else at  # a wave is refused below, whatever the names of the point
-    time, x = operating_point(model, p, point, t, settled)
-    slopes = Linearization(model, p, x, time, named)
-    title = titled(model.form.graph.name, near(model, at, time))
-    return linear_model(title, slopes, None if outputs is None else as_names(outputs), x, time)
+    model, p, time, x, phase = point
+    slopes = Linearization(model, p, x, time, input_names(model, inputs))
+    where = about(model, at, time) if phase else near(model, at, time)
+    title = titled(name, where, phase)
+    return linear_model(title, slopes, None if outputs is None else as_names(outputs), x, time, phase)
 
 
 def near(model: CompiledModel, at: Point, t: float) -> str:
@@ -95,7 +86,14 @@ def input_names(model: CompiledModel, inputs: Names) -> tuple[str, ...]:
 
 
 def operating_point(model: CompiledModel, p: Array, at: Point, t: Time, settled: float) -> tuple[float, Array]:
-    """Time and states (n,) at a point; arguments as for `linearized`.
+    """Time and states (n,) at a point.
+
+    Args:
+        model: the compiled model.
+        p: parameter vector.
+        at: speeds, twists and torques at the point, what is not named at rest; or a motion at one time; None for rest.
+        t: time at which the laws are read, s; None for that of the motion or steady state, or else `settled`.
+        settled: a time after which no law switches any more, s.
 
     Raises:
         ParameterError: the point is none.

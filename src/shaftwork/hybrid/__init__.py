@@ -18,5 +18,5 @@ engine runs; else the engine begins anew.
     phased_model                 what a user calls
 
 Beside these, `reactions` holds many frictions in one set of equations, `resting` has the laws of what cannot move,
-`hybrid_waves` joins travelling waves to a motion, and `named_phases` finds a phase by its name.
+`named_phases` finds a phase by its name, and `waves.hybrid_waves` joins travelling waves to a motion.
 """

@@ -12,6 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from operator import itemgetter
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -33,9 +34,10 @@ from shaftwork.integrate import choice
 from shaftwork.integrate.problem import Problem, SeriesError, StickingError, Trajectory, changed
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.implicit import PRESCRIBED, at_rest
-from shaftwork.pipeline.motion_start import Ending, start_of
-from shaftwork.waves.hybrid_waves import WaveRun
-from shaftwork.waves.wave_motion import CarriedWaves, WaveStart
+from shaftwork.pipeline.motion_start import Ending
+
+if TYPE_CHECKING:
+    from shaftwork.waves.hybrid_waves import WaveRun
 
 CHATTER = ((200, 1e-9), (3000, 1e-6))
 """So many changes of mode, each within this part of the run of the one before, are chatter. Rebounds come ever faster,
@@ -168,7 +170,7 @@ class HybridRun:
         assembly = regime.assembly
         if isinstance(initial, Mapping) and initial and start != 0:
             refuse_incomplete(assembly.stores.names, initial, start)
-        x, waves = start_of(assembly.model, assembly.prepared(regime.p), initial, self.demand.span)
+        x, waves = assembly.model.start(assembly.prepared(regime.p), initial, self.demand.span)
         return HybridState(regime, self._beside_waves(regime, x, waves))
 
     def _after(self, regime: Regime) -> float:
@@ -180,10 +182,12 @@ class HybridRun:
         after = self._after(read.regime)
         return self.settling.settle(self.demand.span[0], after, self.settling.started(after, read.x, joins), None)
 
-    def _beside_waves(self, regime: Regime, x: Array, start: WaveStart | CarriedWaves | None) -> Array:
+    def _beside_waves(self, regime: Regime, x: Array, start: Any) -> Array:
         """The states at the start, and behind them what arrives by waves, if there are any."""
         if not regime.assembly.model.form.waves:
             return x
+        from shaftwork.waves.hybrid_waves import WaveRun
+
         self.waves = WaveRun(regime.assembly.bound(regime.p), start, self.demand.span)
         return np.concatenate([x, self.waves.arriving(self.demand.span[0])])
 

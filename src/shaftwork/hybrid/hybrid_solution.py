@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from functools import cache, cached_property, partial
 from itertools import chain, groupby
 from operator import attrgetter
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,7 +21,9 @@ from shaftwork.hybrid.modes.mode_machines import ModeMachine, ModeNames
 from shaftwork.hybrid.phase_observer import PhaseObserver, Stretch, Stretches
 from shaftwork.results.observer import PhaseRow
 from shaftwork.results.solution import Solution
-from shaftwork.waves.hybrid_waves import WaveRun
+
+if TYPE_CHECKING:
+    from shaftwork.waves.hybrid_waves import WaveRun
 
 
 def solution(run: HybridRun, name: str) -> Solution:

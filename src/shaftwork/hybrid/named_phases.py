@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from sympy import And, Expr, Float, Not, Or, Piecewise, Symbol, false, true
@@ -17,7 +18,9 @@ from sympy.core.relational import Ge, Gt, Le, Lt, Relational
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Mode, ModeChoice, Modes
 from shaftwork.core.errors import ParameterError
-from shaftwork.formulation.form import state_form
+from shaftwork.equations.kirchhoff import kirchhoff
+from shaftwork.equations.records import Equations, NamedPhase
+from shaftwork.formulation.form import StateForm, state_form
 from shaftwork.hybrid.modes.resting import at_rest
 from shaftwork.network.graph import CircuitGraph, GraphPart, build_graph
 from shaftwork.network.netlist import Netlist
@@ -31,6 +34,34 @@ def words_of(phase: Any) -> str:
     """The name of a phase that is given by it, or as a row of `Solution.phases`; whatever else is refused later."""
     words: str = getattr(phase, "name", phase)
     return words
+
+
+def equations_in(
+    netlist: Netlist, form: StateForm, phase: str | NamedPhase, sound: Callable[[Netlist], StateForm]
+) -> Equations:
+    """The equations of a network in a phase of its motion.
+
+    Args:
+        netlist: of the network.
+        form: its state form in the first mode of every part.
+        phase: parts and modes, or a row of `Solution.phases`.
+        sound: makes the state form of a network without errors.
+
+    Raises:
+        NetworkError: the network cannot be assembled in that phase.
+        ParameterError: no part or mode has this name.
+    """
+    name = words_of(phase)
+    then = _form_in(netlist, form.graph, name, sound) if name else form
+    again = partial(equations_in, netlist, form, sound=sound)
+    return dataclasses.replace(kirchhoff(then), phase=whole_name(form.graph, name), in_phase=again)
+
+
+def _form_in(netlist: Netlist, graph: CircuitGraph, phase: str, sound: Callable[[Netlist], StateForm]) -> StateForm:
+    """The state form in a phase, with the laws that hold at its times."""
+    form = sound(in_phase(netlist, graph, phase))
+    then = during(form.graph, span_of(graph, phase))
+    return form if then is form.graph else state_form(then)
 
 
 def in_phase(netlist: Netlist, graph: CircuitGraph, phase: str) -> Netlist:

@@ -20,19 +20,6 @@ from shaftwork.core.notices import warn
 from shaftwork.core.parameters import in_si
 from shaftwork.equations.records import NamedPhase
 from shaftwork.formulation.form import StateForm
-from shaftwork.frequency.analysis import (
-    Given,
-    Names,
-    Point,
-    Time,
-    about,
-    input_names,
-    moment_of,
-    operating_point,
-    titled,
-)
-from shaftwork.frequency.linear_model import LinearModel, linear_model
-from shaftwork.frequency.linearization import Linearization, refuse_waves
 from shaftwork.hybrid.event_iteration import EventIteration
 from shaftwork.hybrid.hybrid_run import HybridRun
 from shaftwork.hybrid.hybrid_solution import solution
@@ -41,8 +28,9 @@ from shaftwork.hybrid.modes.exceeded_guards import passes_limit
 from shaftwork.hybrid.named_phases import known_modes, modes_in, whole_name, words_of
 from shaftwork.hybrid.phases import Phases
 from shaftwork.network.wording import listed
-from shaftwork.pipeline.arguments import Demand
+from shaftwork.pipeline.arguments import Demand, Given, Point, Time
 from shaftwork.pipeline.model import Model
+from shaftwork.pipeline.prepared import OperatingPoint
 from shaftwork.pipeline.settled import SteadyState, refuse_moving, warn_of_earlier_levels
 from shaftwork.pipeline.sizes import in_its_size
 from shaftwork.results.solution import Solution
@@ -99,6 +87,8 @@ class PhasedModel(Model):
     Each phase has equations of its own, see `phase`.
     """
 
+    phased = True
+
     @cached_property
     def states(self) -> tuple[str, ...]:
         """All that is stored in any phase, as in a solution; which of it are states depends on the phase."""
@@ -149,8 +139,6 @@ class PhasedModel(Model):
 
     def _steady(self, values: Mapping[str, float], t: float, initial: Given) -> SteadyState:
         """Steady states of one set of equations after another, until no mode changes there."""
-        if self.form.waves:
-            return self.twin.steady_state(t, initial=initial, parameters=values)
         first = self.phases.assembly(self.phases.first)
         when = t if math.isfinite(t) else first.model.settled(first.vector(values, {}))
         settling = EventIteration(self.phases, values, (0.0, 1.0))
@@ -176,20 +164,16 @@ class PhasedModel(Model):
             f"with {self.words(moment)}. {another_start(self.form)}"
         )
 
-    def point(self, values: Mapping[str, float], at: Point, t: Time) -> tuple[float, HybridState]:
-        """Time in s at a point, and the modes that go on there with their states.
+    def point(self, values: Mapping[str, float], at: Point, t: Time) -> OperatingPoint:
+        """The equations of the phase that goes on at a point, and where it is; see `Model.point`."""
+        time, moment = self.moment_at(values, at, t)
+        regime = moment.regime
+        return OperatingPoint(regime.assembly.model, regime.p, time, moment.x, self.words(moment))
 
-        Args:
-            values: parameters that differ from the network's.
-            at: the point, as for `linearize`.
-            t: time at which laws are read, s; by default as for `linearize`.
+    def moment_at(self, values: Mapping[str, float], at: Point, t: Time) -> tuple[float, HybridState]:
+        """Time in s at a point, and the modes that go on there with their states; see `point`."""
+        from shaftwork.frequency.analysis import moment_of, operating_point
 
-        Raises:
-            ParameterError: the point is none.
-            SignalError: there is no such quantity.
-            SimulationError: a shaft is a wave.
-        """
-        refuse_waves(self.form)
         first = self.phases.assembly(self.phases.first)
         settling = EventIteration(self.phases, values, (0.0, 1.0))
         p = settling.regime(self.phases.first).p
@@ -202,16 +186,6 @@ class PhasedModel(Model):
             time, x = operating_point(first.model, p, at, t, usual)
         return time, settling.settle(time, time, settling.started(time, x), None)[0]
 
-    def near(self, at: Point, t: Time, inputs: Names, outputs: Names = None, values: Given = None) -> LinearModel:
-        """The network near a point, in the phase that goes on there."""
-        time, moment = self.point(values or {}, at, t)
-        model = moment.regime.assembly.model
-        slopes = Linearization(model, moment.regime.p, moment.x, time, input_names(model, inputs))
-        named = None if outputs is None else (outputs,) if isinstance(outputs, str) else tuple(outputs)
-        phase = self.words(moment)
-        title = titled(self.name, about(model, at, time), phase)
-        return linear_model(title, slopes, named, moment.x, time, phase)
-
     def words(self, moment: HybridState) -> str:
         """The phase of a moment, "gap open, brake locked"."""
         pairs = zip(self.phases.elements, moment.regime.modes, strict=True)
@@ -219,8 +193,6 @@ class PhasedModel(Model):
 
     def start_equations(self, values: Mapping[str, float]) -> BoundArrays:
         """The equations of the first phase, of which start values tell the states."""
-        if self.form.waves:
-            return self.twin.start_equations(values)
         first = self.phases.assembly(self.phases.first)
         return first.bound(first.vector(values, {}))
 

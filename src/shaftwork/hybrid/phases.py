@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -22,8 +22,6 @@ from shaftwork.integrate.engines import ADAMS, available
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.model import Model
-from shaftwork.waves.hybrid_waves import WaveModeEquations
-from shaftwork.waves.wave_motion import engine_of_waves
 
 FOLLOWING = {
     "heyoka": (1.0, 1e-12),  # the cost grows only with the logarithm
@@ -47,6 +45,9 @@ class Phases:
         base: the model in the first mode of each element, in which no mode joins anything rigidly.
         rebuild: makes the model of a changed netlist.
     """
+
+    kind: ClassVar[type[ModeEquations]] = ModeEquations
+    """Of the sets of equations."""
 
     def __init__(self, base: Model, rebuild: Callable[[Netlist], Model]) -> None:
         self.netlist, self._rebuild = base.netlist, rebuild
@@ -74,8 +75,7 @@ class Phases:
                     model = self._rebuild(netlist)
                     if (resting := at_rest(netlist, model.form)) is not netlist:
                         model = self._rebuild(resting)
-                kind = WaveModeEquations if model.form.waves else ModeEquations
-                assembly: ModeEquations | NetworkError = kind(model, self.elements, forms)
+                assembly: ModeEquations | NetworkError = self.kind(model, self.elements, forms)
             except NetworkError as error:
                 assembly = error
             self._assemblies.setdefault(forms, assembly)  # another thread may have been first
@@ -160,8 +160,6 @@ class Phases:
         Raises:
             ParameterError: the one that is asked for follows no modes.
         """
-        if assembly.model.form.waves:
-            return engine_of_waves(engine)
         assembly, modes = assembly.alike(modes)
         key = assembly, modes, engine
         if engine != "auto":

@@ -1,10 +1,11 @@
-"""What a user gives to a run, checked: times, tolerances, outputs."""
+"""What a user gives to a run or a study, checked: times, tolerances, outputs, measures, engines."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Literal
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
@@ -14,8 +15,10 @@ from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si, numbers_in_si, whole
 from shaftwork.formulation.form import StateForm
+from shaftwork.integrate.engines import ENGINES
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.netlist import Netlist, by_part
+from shaftwork.results.solution import Solution
 
 OUTPUTS, MOST_OUTPUTS = 1001, 10_000_000
 """Output times when the user gives none, and the most that can be asked for."""
@@ -23,7 +26,16 @@ FINEST_RTOL = float(np.finfo(float).eps)
 """What doubles can keep; a smaller tolerance would promise what no engine holds."""
 NOMINAL = 1e-3
 """Absolute tolerance as a fraction of the relative one, for a speed of 1 rad/s (m/s, V)."""
+STUDIED = ("auto", *ENGINES, "wave")
+"""What an engine may be called in a study."""
 OutputTimes = int | Sequence[float] | Array | Literal["steps"] | None
+Given = Mapping[str, float] | None
+"""Values by name."""
+Point = Given | Solution
+"""A point about which a network moves: values by name, or a motion at one time; None for rest."""
+Names = str | Sequence[str] | None
+Time = float | None
+Item = TypeVar("Item")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -246,3 +258,50 @@ def branches_anew(graph: CircuitGraph, values: Mapping[str, float]) -> bool:
         or part.component.changed(**changed[part.name]).resolved != part.component.resolved
         for part in consulting
     )
+
+
+def several(name: str, items: Iterable[Item]) -> tuple[Item, ...]:
+    """A sequence that a user gave.
+
+    Raises:
+        ParameterError: it is one text, whose letters nobody means, or no sequence.
+    """
+    if isinstance(items, str) or not isinstance(items, Iterable):
+        raise ParameterError(f"{name} = {items!r} must be a sequence. Write {name}=[{items!r}].")
+    return tuple(items)
+
+
+def by_name(measures: Any) -> dict[str, Any]:
+    """What a user wants measured, by the names given to it; of a list each measure is its own name.
+
+    Raises:
+        ParameterError: it is neither a mapping nor a list, there is nothing in it, or two have the same name.
+    """
+    if isinstance(measures, str):
+        measures = [measures]
+    if not isinstance(measures, Iterable):
+        raise ParameterError(f"measures = {measures!r} must be a list of names, such as ['max shaft.tau'].")
+    if not isinstance(measures, Mapping):
+        measures = {text: text for text in map(str, measures)}
+    if not measures:
+        raise ParameterError("Name a measure, such as measures=['max shaft.tau'].")
+    if twice := repeated(map(str, measures)):
+        raise ParameterError(f"Two measures are called '{twice}'. Give each a name of its own.")
+    return {str(name): measure for name, measure in measures.items()}
+
+
+def repeated(names: Iterable[str]) -> str:
+    """The first name that is there twice; empty where none is."""
+    return next((name for name, count in Counter(names).items() if count > 1), "")
+
+
+def engine_names(engines: Iterable[str]) -> tuple[str, ...]:
+    """Engines by name.
+
+    Raises:
+        ParameterError: there is no such engine.
+    """
+    names = several("engines", engines)
+    if unknown := [name for name in names if name not in STUDIED]:
+        raise ParameterError(f"There is no engine {unknown[0]!r}. Take some of: {', '.join(STUDIED)}.")
+    return names

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from shaftwork.codegen.starts.operating import steady_state
 from shaftwork.codegen.starts.start_values import initial_state, with_others
 from shaftwork.codegen.valueless import refuse_vanishing
 from shaftwork.core.calls import Callback
-from shaftwork.core.errors import ParameterError
+from shaftwork.core.errors import Diagnostic, ParameterError
 from shaftwork.core.kept import Kept
 from shaftwork.core.notices import PulsationWarning, muted
 from shaftwork.core.parameters import in_si
@@ -26,10 +26,15 @@ from shaftwork.formulation.form import StateForm
 from shaftwork.integrate import choice
 from shaftwork.integrate.engines import EngineName, available
 from shaftwork.integrate.problem import Problem, Trajectory
+from shaftwork.network.checks import resting_trains
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import (
     Demand,
+    Given,
+    Names,
     OutputTimes,
+    Point,
+    Time,
     as_names,
     changes_structure,
     checked_parameters,
@@ -42,22 +47,22 @@ from shaftwork.pipeline.arguments import (
 from shaftwork.pipeline.implicit import IMPLICIT, PRESCRIBED, at_rest, solve_loops, start_of_loops
 from shaftwork.pipeline.motion_start import (
     Ending,
+    Repetition,
+    call_of,
     ending_of,
+    model_again,
     refuse_motion,
-    start_of,
+    remember,
     time_of_start,
     warn_of_rest,
 )
-from shaftwork.pipeline.prepared import EngineModel, Prepared
+from shaftwork.pipeline.prepared import EngineModel, OperatingPoint, Prepared
 from shaftwork.pipeline.settled import SteadyState, refuse_moving, warn_of_earlier_levels
 from shaftwork.pipeline.sizes import in_its_size, with_accuracy
-from shaftwork.pipeline.stored import Repetition, call_of, model_again, remember
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
-    from shaftwork.frequency.analysis import Given, Names, Point, Time
     from shaftwork.frequency.linear_model import LinearModel
-    from shaftwork.waves.wave_motion import CarriedWaves, WaveStart
 
 VARIANTS = 8
 """Models of other structure, and choices of an engine, that are kept for later calls."""
@@ -73,6 +78,9 @@ class Model(EngineModel):
         netlist: what it was made of.
         rebuild: makes the model of a changed netlist; used where a new parameter value changes the structure.
     """
+
+    phased: ClassVar[bool] = False
+    """Whether parts change their mode, so that each phase has equations of its own."""
 
     def __init__(self, form: StateForm, netlist: Netlist, rebuild: Callable[[Netlist], Model]) -> None:
         super().__init__(form)
@@ -146,21 +154,26 @@ class Model(EngineModel):
         wanted = relative_tolerance(rtol), atol, output_times(t_eval, *span), engine, step_limit(max_steps)
         demand = Demand(span, *wanted, told if progress else None)
         if initial is None or (isinstance(initial, Mapping) and not isinstance(initial, Ending)):
-            warn_of_rest(self.form.graph, initial or {})
+            warn_of_rest(self.name, self._resting, initial or {})
         motion = with_accuracy(told.of(lambda: self._motion(values, initial, demand)), demand)
         parameters = dict(zip(self.parameters, self.defaults.tolist(), strict=True)) | values
         again = Repetition(self._rebuild, self.netlist, call_of(motion, demand, values, initial), self)
         return replace(motion, parameters=parameters, initial=dict(initial or {}), rtol=demand.rtol, again=again)
+
+    @cached_property
+    def _resting(self) -> tuple[Diagnostic, ...]:
+        """Trains that nothing joins to the drive."""
+        return resting_trains(self.form.graph)
 
     def _motion(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
         prepared = self.prepare(self.vector(values) if values else self.defaults)
         return in_its_size(self.form, prepared, demand, lambda sized: self._run(prepared, initial, sized))
 
     def _run(self, prepared: Prepared, initial: Given, demand: Demand) -> Solution:
-        x0, waves = start_of(self, prepared, initial, demand.span)
+        x0, waves = self.start(prepared, initial, demand.span)
         problem, bind = self.problem(prepared, x0, demand), lambda: prepared.bound
         refuse_vanishing(self.form, bind, lambda: np.array([problem.t0]), lambda _: x0[None])
-        trajectory, name, why = self._solve(prepared, problem, waves, demand.engine)
+        trajectory, name, why = self._solve(prepared, problem, demand.engine, waves)
         refuse_vanishing(self.form, bind, lambda: trajectory.dense.steps, trajectory.dense)
         return Solution(
             name=self.name,
@@ -201,8 +214,6 @@ class Model(EngineModel):
         return self._steady(values, time, initial)
 
     def _steady(self, values: Mapping[str, float], t: float, initial: Given) -> SteadyState:
-        if self.form.waves:
-            return self.twin.steady_state(t, initial=initial, parameters=values)
         prepared = self.prepare(self.vector(values) if values else self.defaults)
         when = t if math.isfinite(t) else self.settled(prepared.p)
         start = initial_state(prepared.bound, initial or {}, when)
@@ -217,7 +228,11 @@ class Model(EngineModel):
         """The equations of which start values tell the states."""
         if self._changes_structure(values):
             return self._variant(values).start_equations({})
-        return (self.twin if self.form.waves else self).bind(self.vector(values))
+        return self.bind(self.vector(values))
+
+    def start_phase(self) -> str:
+        """The phase in which a motion from rest begins; empty, as no part changes its mode."""
+        return ""
 
     def linearize(
         self, at: Point = None, *, inputs: Names = None, outputs: Names = None, t: Time = None, parameters: Given = None
@@ -246,8 +261,20 @@ class Model(EngineModel):
         """The same for values of parameters that have been looked at and change no structure."""
         from shaftwork.frequency.analysis import linearized
 
-        p = self.vector(values or {})
-        return linearized(self, p, at, t, self.settled(p), inputs, outputs)
+        return linearized(self.name, self.point(values or {}, at, t), at, inputs, outputs)
+
+    def point(self, values: Mapping[str, float], at: Point, t: Time) -> OperatingPoint:
+        """The equations that hold at a point, and where it is; arguments as for `linearize`.
+
+        Raises:
+            ParameterError: the point is none.
+            SignalError: there is no such quantity.
+            SimulationError: a shaft is a wave.
+        """
+        from shaftwork.frequency.analysis import operating_point
+
+        p = self.vector(values)
+        return OperatingPoint(self, p, *operating_point(self, p, at, t, self.settled(p)))
 
     def choose_engine(self, t_end: float, *, t_start: float = 0.0, rtol: float = 1e-8) -> tuple[str, str]:
         """The engine that "auto" takes for a motion, and why."""
@@ -255,19 +282,18 @@ class Model(EngineModel):
 
     def _choice(self, demand: Demand) -> tuple[str, str]:
         prepared = self.prepare(self.defaults)
-        x0, _ = start_of(self, prepared, None, demand.span)
+        x0, _ = self.start(prepared, None, demand.span)
         return self._engine(prepared, self.problem(prepared, x0, demand), "auto")
 
     def _solve(
-        self, prepared: Prepared, problem: Problem, waves: WaveStart | CarriedWaves | None, engine: str
+        self,
+        prepared: Prepared,
+        problem: Problem,
+        engine: str,
+        waves: Any,  # noqa: ARG002 (here are none)
     ) -> tuple[Trajectory, str, str]:
         """The run, the engine that made it, and why that one."""
         name, why = self._engine(prepared, problem, engine)
-        if name == "wave":
-            from shaftwork.waves.wave_motion import solve_waves
-
-            steady = self.degree == 0
-            return solve_waves(prepared.bound, problem, waves, linear=self.linear, steady=steady), name, why
         if not self.states:
             return at_rest(problem, self.degree), name, why
         if self.form.loop_laws:
@@ -278,10 +304,6 @@ class Model(EngineModel):
 
     def _engine(self, prepared: Prepared, problem: Problem, engine: str) -> tuple[str, str]:
         """The engine for a motion, and why."""
-        if self.form.waves:
-            from shaftwork.waves.wave_motion import engine_of_waves
-
-            return engine_of_waves(engine)
         choice.check(engine)
         if not self.states:
             return "exact", PRESCRIBED
@@ -296,13 +318,6 @@ class Model(EngineModel):
         chosen = choice.choose(problem)
         self._choices = [*self._choices[1 - VARIANTS :], (key, prepared.p, chosen)]
         return chosen
-
-    @cached_property
-    def twin(self) -> Model:
-        """The network with springs in place of its waves: it stands and turns steadily as they do."""
-        from shaftwork.waves.wave_motion import twin
-
-        return self._rebuild(twin(self.netlist))
 
     def _changes_structure(self, values: Mapping[str, float]) -> bool:
         """Whether other equations hold for new values."""

@@ -1,39 +1,28 @@
-"""How a motion starts: at rest, from values by name, or where another motion ended, as if there had been no end."""
+"""How a motion starts: at rest, from values by name, or where another motion ended, as if there had been no end.
+
+And how one that was stored (pickled) is made again when it is needed, as compiled code cannot be stored: a model from
+its network and the options of its compilation, a motion from the call that led to it.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
-from weakref import WeakKeyDictionary
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+from weakref import WeakValueDictionary
 
-import numpy as np
-
-from shaftwork.codegen.array_form.elements import Array
-from shaftwork.codegen.starts.start_values import initial_state
-from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.core.errors import AccuracyWarning, Diagnostic, NetworkWarning, ParameterError
-from shaftwork.core.notices import warn
+from shaftwork.core.notices import muted, warn
 from shaftwork.core.parameters import in_si
-from shaftwork.network.checks import resting_trains
 from shaftwork.network.graph import CircuitGraph
+from shaftwork.network.netlist import Netlist
 from shaftwork.network.wording import first_few, listed
-from shaftwork.pipeline.prepared import EngineModel, Prepared
+from shaftwork.pipeline.arguments import Demand
 from shaftwork.results.solution import Solution
 
-if TYPE_CHECKING:
-    from shaftwork.waves.wave_motion import CarriedWaves, WaveStart
-
-_RESTING: WeakKeyDictionary[CircuitGraph, tuple[Diagnostic, ...]] = WeakKeyDictionary()
-"""What `resting_trains` gives: it takes as long as a short run."""
 SAME_TIME = 1e-12
 """Times that differ by less than this fraction are one: units are converted."""
-
-
-def waving(graph: CircuitGraph) -> tuple[str, ...]:
-    """Names of the parts that waves travel along."""
-    histories = (branch.index for branch in graph.branches if branch.template.is_history)
-    return tuple(dict.fromkeys(graph.part_of(index).name for index in histories))
 
 
 class Ending(dict[str, float]):
@@ -55,7 +44,7 @@ class Ending(dict[str, float]):
         read: float,
         modes: Mapping[str, str],
         parameters: Mapping[str, float],
-        waves: CarriedWaves | None,
+        waves: object,
     ) -> None:
         super().__init__(stored)
         self.t, self.read, self.modes, self.parameters, self.waves = t, read, dict(modes), dict(parameters), waves
@@ -121,7 +110,7 @@ def ending_of(motion: Solution, graph: CircuitGraph) -> Ending:
         )
     t, x = float(motion.t[-1]), motion.x[-1]
     observer, carried = motion.observer, getattr(motion.dense, "carried", None)
-    waves = carried(t) if waving(graph) and carried is not None else None
+    waves = None if carried is None else carried(t)
     return Ending(observer.held(t, x), t, observer.read_at(t), observer.modes_at(t), motion.parameters, waves)
 
 
@@ -154,86 +143,85 @@ def refuse_motion(initial: Any, what: str) -> None:
         )
 
 
-def warn_of_rest(graph: CircuitGraph, initial: Mapping[str, float]) -> None:
+def warn_of_rest(name: str, resting: Iterable[Diagnostic], initial: Mapping[str, float]) -> None:
     """Warn of trains that nothing joins to the drive and that no start value moves.
 
     Args:
-        graph: the network.
+        name: of the network.
+        resting: these trains, as `resting_trains` finds them.
         initial: start values.
     """
     moved = {str(name).rpartition(".")[0] for name, value in initial.items() if value}
-    if (resting := _RESTING.get(graph)) is None:
-        resting = _RESTING[graph] = resting_trains(graph)
     for train in resting:
         if moved.isdisjoint((*train.parts, *train.nodes)):
-            warn(f"'{graph.name}' has a train that stays at rest: {train}", NetworkWarning)
+            warn(f"'{name}' has a train that stays at rest: {train}", NetworkWarning)
 
 
-def start_of(
-    model: EngineModel, prepared: Prepared, initial: Mapping[str, float] | None, span: tuple[float, float]
-) -> tuple[Array, WaveStart | CarriedWaves | None]:
-    """The states (n,) at the start, and the waves where they are not at rest.
-
-    Args:
-        model: the compiled equations.
-        prepared: their parameters.
-        initial: start values, or where another motion ended; None for rest.
-        span: start and end of the run, s.
-
-    Raises:
-        SignalError: there is no such quantity.
-        ParameterError: values are not finite, contradict each other or leave something open.
-    """
-    if initial is None and not model.form.has_impulses:
-        return np.zeros(len(model.states)), None
-    _, after = model.switching.timeline(prepared.p, *span).sides(span[0])
-    values = dict(zip(model.parameters, prepared.p.tolist(), strict=True))
-    if isinstance(initial, Ending) and (initial.waves is not None or not model.form.waves):
-        return _taken_up(prepared, initial, after, changes=bool(initial.changed(values))), initial.waves
-    if not model.form.waves:
-        return initial_state(prepared.bound, {} if initial is None else initial, after), None
-    from shaftwork.waves.wave_motion import start_of_waves
-
-    if isinstance(initial, Ending):
-        warn_of_lost_waves(span[0], in_leaps=True)
-        initial = {name: initial[name] for name in model.states}
-    elif initial and span[0] != 0:
-        warn_of_lost_waves(span[0])
-    return start_of_waves(prepared.bound, model.twin.bind(model.twin.vector(values)), initial or {}, after)
+Rebuild = Callable[[Netlist], Any]
+"""Makes the model of a network."""
+_LIVING: WeakValueDictionary[tuple[Rebuild, Netlist], Any] = WeakValueDictionary()
+"""Models that have been stored or made again: all motions of one network that a process reads share one."""
 
 
-def _taken_up(prepared: Prepared, ending: Ending, after: float, *, changes: bool) -> Array:
-    """The states (n,) that go on with what was stored, after what jumps at that instant.
+def remember(model: Any, rebuild: Rebuild) -> tuple[Rebuild, Netlist]:
+    """What a model is stored as."""
+    _LIVING[rebuild, model.netlist] = model
+    return rebuild, model.netlist
+
+
+def model_again(rebuild: Rebuild, netlist: Netlist) -> Any:
+    """The model of a network; its author has been warned when it was first made."""
+    model = _LIVING.get((rebuild, netlist))
+    if model is None:
+        with muted(NetworkWarning):
+            model = _LIVING[rebuild, netlist] = rebuild(netlist)
+    return model
+
+
+@dataclass(frozen=True, eq=False)
+class Repetition:
+    """The call that has led to a motion.
 
     Args:
-        prepared: the equations.
-        ending: of the motion before.
-        after: time at which inputs are read from now on, s.
-        changes: whether a parameter is another one: what is rigidly joined may then have to change its speeds at once.
+        rebuild: makes the model again.
+        netlist: of which it is a motion.
+        options: of `Model.simulate`.
+        model: the model itself, where it is at hand.
     """
-    form, bound, stores = prepared.form, prepared.bound, StateTransfer(prepared.form)
-    if changes:
-        ending.refuse_lacking(stores.names)
-        x = stores.states(bound, ending.read, ending)
-    else:  # without the full matrices of all stores, which a large network has no room for
-        ending.refuse_lacking(state.name for state in form.states)
-        x = np.array([ending[state.name] for state in form.states])
-    return bound.impulse(x, ending.read, after) if form.has_impulses and after != ending.read else x
+
+    rebuild: Rebuild
+    netlist: Netlist
+    options: Mapping[str, Any]
+    model: Any = None
+
+    def __call__(self) -> Solution:
+        """The motion, made again."""
+        model = self.model or model_again(self.rebuild, self.netlist)
+        with muted(NetworkWarning, AccuracyWarning):  # its author has seen them
+            motion: Solution = model.simulate(**self.options)
+            return motion
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        if self.model is not None:
+            remember(self.model, self.rebuild)
+        return Repetition, (self.rebuild, self.netlist, self.options)
 
 
-def warn_of_lost_waves(t_start: float, *, in_leaps: bool = False) -> None:
-    """Warn of a motion that goes on at a time in s without what was on its way.
+def call_of(
+    motion: Solution, demand: Demand, values: Mapping[str, float], initial: Mapping[str, Any] | None
+) -> dict[str, Any]:
+    """The arguments of `Model.simulate` that lead to a motion again, by the engine that was taken.
 
-    Args:
-        t_start: the time, s.
-        in_leaps: whether the motion before is known and has leapt through its waves; else only start values are.
+    A motion through phases has an engine for each, which is chosen anew.
     """
-    why, remedy = "start values tell of their ends alone", "Give the motion itself, initial=sol"
-    if in_leaps:
-        why, remedy = "a long run leaps from one output time to the next", "Simulate it with t_eval='steps'"
-    warn(
-        f"The motion goes on at t_start = {t_start:g} s without the waves that were on their way through shafts: "
-        f"{why}, and the torque of a shaft begins as in steady operation. {remedy}; or simulate all of it in one run, "
-        "or take another model of the shaft, such as Lumped(20).",
-        AccuracyWarning,
-    )
+    return {
+        "t_start": demand.span[0],
+        "t_end": demand.span[1],
+        "rtol": demand.rtol,
+        "atol": demand.atol,
+        "t_eval": "steps" if demand.t_eval is None else demand.t_eval.copy(),
+        "engine": demand.engine if motion.phases else motion.engine,
+        "max_steps": demand.max_steps,
+        "parameters": dict(values),
+        "initial": initial if initial is None or isinstance(initial, Ending) else dict(initial),
+    }

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
 import gc
 import reprlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self
 
@@ -17,21 +15,18 @@ from shaftwork.core.notices import muted, warn
 from shaftwork.equations.kirchhoff import kirchhoff
 from shaftwork.equations.records import Equations, NamedPhase
 from shaftwork.formulation.diagnosis import diagnose
-from shaftwork.formulation.form import StateForm, state_form
-from shaftwork.hybrid.named_phases import during, in_phase, span_of, whole_name, words_of, words_of_modes
-from shaftwork.hybrid.phased_model import PhasedModel
-from shaftwork.modelfiles.storage import read_netlist, write_netlist
+from shaftwork.formulation.form import StateForm
 from shaftwork.network.builder import NetworkBuilder
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.angles import with_angles
-from shaftwork.pipeline.arguments import as_names
+from shaftwork.pipeline.arguments import Point, Time, as_names
 from shaftwork.pipeline.model import Model
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
     from shaftwork.drawing.canvas import Drawing
-    from shaftwork.frequency.analysis import Point, SmallMotions, Time
+    from shaftwork.frequency.analysis import SmallMotions
     from shaftwork.frequency.campbell import Campbell
     from shaftwork.frequency.frequency_response import FrequencyResponse
     from shaftwork.frequency.natural_modes import Modes
@@ -100,7 +95,9 @@ class Network(NetworkBuilder):
         form = _sound(netlist)
         if not any(part.modes for part in form.graph.parts) and phase is None:
             return kirchhoff(form)
-        return _equations_in(netlist, form, "" if phase is None else phase)
+        from shaftwork.hybrid.named_phases import equations_in
+
+        return equations_in(netlist, form, "" if phase is None else phase, _sound)
 
     def start_phase(self) -> str:
         """The phase in which a motion from rest begins, "gap open, load stuck"; empty where no part changes its mode.
@@ -109,8 +106,7 @@ class Network(NetworkBuilder):
             NetworkError: the network cannot be assembled; lists every reason.
             SimulationError: no modes go together at the start.
         """
-        model = self.compile()
-        return model.start_phase() if isinstance(model, PhasedModel) else ""
+        return self.compile().start_phase()
 
     def lagrangian(self, *, expand: bool = False, phase: str | NamedPhase | None = None) -> Lagrangian:
         """Energies, generalised coordinates and forces, and Lagrange's equations, with their proof by Kirchhoff's.
@@ -268,8 +264,14 @@ class Network(NetworkBuilder):
 
         equations = self.equations(expand=expand, phase=phase)
         graph, items = equations.form.graph, circuit_items if as_circuit else train_items
-        modes = {} if phase is None else words_of_modes(self.graph(), words_of(phase))
-        return drawn(graph, tuple(items(Letters(graph, equations.symbol_names, values, modes))), train=not as_circuit)
+        letters = Letters(graph, equations.symbol_names, values, {} if phase is None else self._modes_in(phase))
+        return drawn(graph, tuple(items(letters)), train=not as_circuit)
+
+    def _modes_in(self, phase: str | NamedPhase) -> dict[str, str]:
+        """The mode of every part that changes its, in words."""
+        from shaftwork.hybrid.named_phases import words_of, words_of_modes
+
+        return words_of_modes(self.graph(), words_of(phase))
 
     def _repr_html_(self) -> str | None:
         """What a notebook shows; nothing but the text where the network cannot be drawn."""
@@ -285,6 +287,8 @@ class Network(NetworkBuilder):
         Raises:
             ModelFileError: a part or a law has no text form.
         """
+        from shaftwork.modelfiles.storage import write_netlist
+
         write_netlist(self.netlist(), path)
 
     @classmethod
@@ -294,6 +298,8 @@ class Network(NetworkBuilder):
         Raises:
             ModelFileError: the file cannot be read as a network; says where and why.
         """
+        from shaftwork.modelfiles.storage import read_netlist
+
         return cls._of(read_netlist(path))
 
     @classmethod
@@ -348,24 +354,24 @@ class Compiler:
             form = _sound(netlist, self.accepted)
             if self.angles:
                 form = with_angles(form.graph, self.angles)
-            chosen = any(item.choices for item in netlist.placed)
-            kind = PhasedModel if any(part.modes for part in form.graph.parts) and not chosen else Model
-            return kind(form, netlist, self)
+            return _kind_of_model(form, netlist)(form, netlist, self)
 
 
-def _equations_in(netlist: Netlist, form: StateForm, phase: str | NamedPhase) -> Equations:
-    """The equations of a network in a phase of its motion; its state form is that in the first mode of every part."""
-    name = words_of(phase)
-    then = _in_phase(netlist, form.graph, name) if name else form
-    again = partial(_equations_in, netlist, form)
-    return dataclasses.replace(kirchhoff(then), phase=whole_name(form.graph, name), in_phase=again)
+def _kind_of_model(form: StateForm, netlist: Netlist) -> type[Model]:
+    """The kind of model that a network needs; that of one phase, in which modes are chosen, has no phases."""
+    if any(part.modes for part in form.graph.parts) and not any(item.choices for item in netlist.placed):
+        if form.waves:
+            from shaftwork.waves.phased_waves import PhasedWaveModel
 
+            return PhasedWaveModel
+        from shaftwork.hybrid.phased_model import PhasedModel
 
-def _in_phase(netlist: Netlist, graph: CircuitGraph, phase: str) -> StateForm:
-    """The state form in a phase, with the laws that hold at its times."""
-    form = _sound(in_phase(netlist, graph, phase))
-    then = during(form.graph, span_of(graph, phase))
-    return form if then is form.graph else state_form(then)
+        return PhasedModel
+    if form.waves:
+        from shaftwork.waves.wave_model import WaveModel
+
+        return WaveModel
+    return Model
 
 
 @contextmanager

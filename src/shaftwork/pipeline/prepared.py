@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import chain
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,6 +14,8 @@ from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.array_form.recovery import BranchHistory
 from shaftwork.codegen.compiled_model import CompiledModel
+from shaftwork.codegen.starts.start_values import initial_state
+from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.codegen.times.time_switches import Switching
 from shaftwork.codegen.valueless import rough, without_value
 from shaftwork.core.errors import CompileError
@@ -25,6 +26,7 @@ from shaftwork.integrate.problem import Fractions, LinearInputs, Observed, Probl
 from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind
 from shaftwork.pipeline.arguments import NOMINAL, Demand
+from shaftwork.pipeline.motion_start import Ending
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +50,27 @@ class Prepared:
         """Of the right-hand side, sparse."""
         return self.bound.jacobian(t, x)
 
+    def taken_up(self, ending: Ending, after: float) -> Array:
+        """The states (n,) that go on with what another motion stored, after what jumps at that instant.
 
-class EngineModel(CompiledModel, ABC):
+        Where a parameter is another one, what is rigidly joined may have to change its speeds at once.
+
+        Args:
+            ending: of the motion before.
+            after: time at which inputs are read from now on, s.
+        """
+        if ending.changed(dict(zip(self.form.graph.parameters, self.p.tolist(), strict=True))):
+            stores = StateTransfer(self.form)
+            ending.refuse_lacking(stores.names)
+            x = stores.states(self.bound, ending.read, ending)
+        else:  # without the full matrices of all stores, which a large network has no room for
+            names = [state.name for state in self.form.states]
+            ending.refuse_lacking(names)
+            x = np.array([ending[name] for name in names])
+        return self.bound.impulse(x, ending.read, after) if self.form.has_impulses and after != ending.read else x
+
+
+class EngineModel(CompiledModel):
     """A compiled network whose motions engines can find.
 
     Args:
@@ -59,11 +80,6 @@ class EngineModel(CompiledModel, ABC):
     def __init__(self, form: StateForm) -> None:
         super().__init__(form)
         self._prepared = Kept[bytes, Prepared](1)
-
-    @property
-    @abstractmethod
-    def twin(self) -> EngineModel:
-        """The network with springs in place of its waves."""
 
     @cached_property
     def switching(self) -> Switching:
@@ -105,7 +121,7 @@ class EngineModel(CompiledModel, ABC):
 
     def _linear_inputs(self, p: Array) -> LinearInputs | None:
         """The linear form, where the network is linear."""
-        if self.form.waves or not self.linear:
+        if not self.linear:
             return None
         n, bound, straight = len(self.states), self.bind(p), self.degree is not None
 
@@ -115,6 +131,31 @@ class EngineModel(CompiledModel, ABC):
 
         matrix = bound.jacobian(0.0, np.zeros(n)).tocsr()
         return LinearInputs(matrix, lambda t: bound.rhs(t, np.zeros((n, *np.shape(t)))), fractions, straight)
+
+    def start(
+        self, prepared: Prepared, initial: Mapping[str, float] | None, span: tuple[float, float]
+    ) -> tuple[Array, Any]:
+        """The states (n,) at the start of a run, and what else is on its way then; without waves that is nothing.
+
+        Args:
+            prepared: the equations.
+            initial: start values, or where another motion ended; None for rest.
+            span: start and end of the run, s.
+
+        Raises:
+            SignalError: there is no such quantity.
+            ParameterError: values are not finite, contradict each other or leave something open.
+        """
+        if initial is None and not self.form.has_impulses:
+            return np.zeros(len(self.states)), None
+        after = self.just_after(prepared, span)
+        if isinstance(initial, Ending):
+            return prepared.taken_up(initial, after), None
+        return initial_state(prepared.bound, initial or {}, after), None
+
+    def just_after(self, prepared: Prepared, span: tuple[float, float]) -> float:
+        """The time at which inputs are read once what jumps at the start has jumped, s."""
+        return self.switching.timeline(prepared.p, *span).sides(span[0])[1]
 
     def problem(self, prepared: Prepared, x0: Array, demand: Demand) -> Problem:
         """A run from states (n,) as an engine takes it."""
@@ -145,6 +186,24 @@ class EngineModel(CompiledModel, ABC):
             max_steps=demand.max_steps,
             progress=demand.progress,
         )
+
+
+class OperatingPoint(NamedTuple):
+    """A point about which a network moves.
+
+    Args:
+        model: the equations that hold there.
+        p: their parameter vector.
+        time: at which laws are read, s.
+        x: (n,) states.
+        phase: the modes of the parts, in words; empty where none changes its mode.
+    """
+
+    model: EngineModel
+    p: Array
+    time: float
+    x: Array
+    phase: str = ""
 
 
 def observed(prepared: Prepared) -> Observed:

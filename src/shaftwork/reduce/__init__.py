@@ -5,8 +5,7 @@ from __future__ import annotations
 from shaftwork.reduce.grouping import Group, Grouping, GroupTable
 from shaftwork.reduce.kinematics import Scale
 from shaftwork.reduce.losses import Comparison, FrequencyLoss, FrequencyTable
-from shaftwork.reduce.reduction_table import ReductionTable
-from shaftwork.reduce.reference_shaft import Referred, refer
+from shaftwork.reduce.reference_shaft import ReductionTable, Referred, refer
 from shaftwork.reduce.referred_parts import Entry
 from shaftwork.reduce.simplification import Simplified, simplify
 

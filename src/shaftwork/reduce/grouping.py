@@ -14,9 +14,6 @@ from shaftwork.components.contacts import Backlash
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import whole
 from shaftwork.core.screen import in_columns
-from shaftwork.latex.nomenclature import breakable, column, unit
-from shaftwork.latex.nomenclature import table as longtable
-from shaftwork.latex.printing import printed_number
 from shaftwork.reduce.chain import Chain, Station, series
 
 MOST = 20_000
@@ -209,6 +206,12 @@ class GroupTable:
 
     def latex(self) -> str:
         """The table as LaTeX, a `longtable` (packages booktabs, array, longtable); at its end what is rigid now."""
+        from shaftwork.latex.nomenclature import breakable, column, table, unit
+        from shaftwork.latex.printing import printed_number
+
+        def listed(names: tuple[str, ...]) -> str:
+            return ", ".join(map(breakable, names))
+
         letters = {"gap": Backlash.declared["gap"].latex}
         rows = [
             (
@@ -216,16 +219,12 @@ class GroupTable:
                 f"${letters.get(row.quantity, row.quantity)}$",
                 f"${printed_number(row.value)}$",
                 unit(row.unit),
-                _listed(row.made_of),
+                listed(row.made_of),
             )
             for row in self.rows
         ]
         if self.rigid:
-            rows.append(("rigid now", "", "", "", _listed(self.rigid)))
+            rows.append(("rigid now", "", "", "", listed(self.rigid)))
         gap = r"@{\hspace{3mm}}"
         columns = gap.join((column(30), "l", "r", "l", column(66)))
-        return longtable(columns, ("Part", "Quantity", "Value", "Unit", "Made of"), rows)
-
-
-def _listed(names: tuple[str, ...]) -> str:
-    return ", ".join(map(breakable, names))
+        return table(columns, ("Part", "Quantity", "Value", "Unit", "Made of"), rows)

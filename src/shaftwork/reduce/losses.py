@@ -11,8 +11,6 @@ from typing import Any
 import numpy as np
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.latex.nomenclature import table as longtable
-from shaftwork.latex.printing import printed_number
 from shaftwork.pipeline.motion_start import rewired
 from shaftwork.pipeline.network import Network
 from shaftwork.reduce.tridiagonal_modes import Array
@@ -78,13 +76,15 @@ class FrequencyTable:
 
     def latex(self) -> str:
         """The table as LaTeX, a `longtable` (packages booktabs, array, longtable), frequencies in Hz."""
+        from shaftwork.latex.nomenclature import table
+
         titles = ("Mode", "Before, Hz", "After, Hz", "Error", "By modes, Hz")
         columns = len(titles) if self.modes else len(titles) - 1
         rows = []
         for row, (mode, _, _, error, _) in zip(self.rows, map(_cells, self.rows), strict=True):
             share = f"${error[:-1]} \\, \\%$" if error else ""
             rows.append((mode, _printed(row.before), _printed(row.after), share, _printed(row.by_modes)))
-        return longtable("r" * columns, titles[:columns], [row[:columns] for row in rows])
+        return table("r" * columns, titles[:columns], [row[:columns] for row in rows])
 
     def _line(self, cells: Sequence[str]) -> str:
         mode, before, after, error, by_modes = cells
@@ -99,6 +99,8 @@ def _cells(row: FrequencyLoss) -> tuple[str, str, str, str, str]:
 
 
 def _printed(frequency: float | None) -> str:
+    from shaftwork.latex.printing import printed_number
+
     return "lost" if frequency is None else f"${printed_number(frequency)}$"
 
 

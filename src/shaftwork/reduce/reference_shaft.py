@@ -2,19 +2,81 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 from shaftwork.components.rotation import LossyGear
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import Diagnostic, NetworkError, ParameterError, SignalError
+from shaftwork.core.screen import in_columns
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
 from shaftwork.pipeline.network import Network, network_of
 from shaftwork.reduce.kinematics import Kinematics, Scale, kinematics
-from shaftwork.reduce.reduction_table import ReductionTable
-from shaftwork.reduce.referred_parts import ReferredPart, referred_part
+from shaftwork.reduce.referred_parts import Entry, ReferredPart, formula_of, referred_part
+
+HEADINGS = ("part", "quantity", "value", "unit", "ratio", "referred", "unit", "formula")
+WIDEST = 28
+"""Characters of a law in the text; a longer one is cut."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReductionTable:
+    """What became of every parameter at a reference shaft.
+
+    Args:
+        to: node of the reference shaft.
+        entries: in the order of the network.
+        read_names: gives LaTeX of the symbols of the network by name, when it is asked for.
+    """
+
+    to: str
+    entries: tuple[Entry, ...]
+    read_names: Callable[[], Mapping[str, str]]
+
+    def __len__(self) -> int:
+        return len(self.entries)
+
+    def __iter__(self) -> Iterator[Entry]:
+        return iter(self.entries)
+
+    def __getitem__(self, name: str) -> Entry:
+        """The entry of a parameter, "shaft.c".
+
+        Raises:
+            SignalError: there is none.
+        """
+        by_name = {f"{entry.part}.{entry.quantity}": entry for entry in self.entries}
+        if name not in by_name:
+            raise SignalError(f"No parameter '{name}' was referred to '{self.to}'. There are: {', '.join(by_name)}.")
+        return by_name[name]
+
+    def __str__(self) -> str:
+        lines = in_columns([HEADINGS, *map(_cells, self.entries)])
+        return "\n".join((f"referred to {self.to}", *lines))
+
+    def latex(self) -> str:
+        """The table as LaTeX, a `longtable` in the letters of the equations; what is a law stands below it.
+
+        It needs the packages amsmath, booktabs, array and longtable.
+        """
+        from shaftwork.reduce.reduction_print import ReductionPrint
+
+        return ReductionPrint(self.entries, self.read_names).latex()
+
+
+def _cells(entry: Entry) -> tuple[str, ...]:
+    value, ratio, referred = (_text(number) for number in (entry.value, entry.ratio, entry.referred))
+    return (entry.part, entry.quantity, value, entry.unit, ratio, referred, entry.referred_unit, formula_of(entry))
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    shown = str(value)
+    return shown if len(shown) <= WIDEST else f"{shown[: WIDEST - 4]} ..."
 
 
 @dataclass(frozen=True, eq=False)

@@ -121,6 +121,22 @@ class Entry:
     factor: Expr
 
 
+def symbol_of(entry: Entry) -> Symbol:
+    """The symbol of a parameter in the equations."""
+    return Symbol(f"{entry.part}.{entry.quantity}", real=True)
+
+
+def formula_of(entry: Entry) -> str:
+    """What became of a parameter, as text."""
+    above, below = entry.factor.as_numer_denom()
+    text = str(symbol_of(entry)) if above == 1 else f"{symbol_of(entry)} * {_bracketed(above)}"
+    return text if below == 1 else f"{text} / {_bracketed(below)}"
+
+
+def _bracketed(product: Expr) -> str:
+    return f"({product})" if product.args and not product.is_Pow else str(product)
+
+
 @dataclass(frozen=True)
 class ReferredPart:
     """A part at the reference shaft, its nodes there, its scale, and what became of its parameters."""

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import product
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from sympy import Expr
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import NetworkError, SimulationError
-from shaftwork.hybrid.hybrid_state import Change
-from shaftwork.hybrid.modes.mode_equations import ModeEquations
-from shaftwork.hybrid.modes.mode_machines import ModeNames, with_modes
-from shaftwork.hybrid.phases import Phases
 from shaftwork.pipeline.model import Model
 from shaftwork.sensitivities.differentiation import Differentiated
 from shaftwork.sensitivities.legs import Leg
+
+if TYPE_CHECKING:
+    from shaftwork.hybrid.hybrid_state import Change
+    from shaftwork.hybrid.modes.mode_equations import ModeEquations
+    from shaftwork.hybrid.modes.mode_machines import ModeNames
+    from shaftwork.hybrid.phases import Phases
 
 CLOSE = 1e-5
 """The run took a path whose states differ from its own by no more than this part of their size: it meets hard stops
@@ -130,6 +132,8 @@ class SensitivityTransfer:
             every: each change takes up what is stored by itself; else impacts alone do, and in the end all.
             besides: in an impact other elements are already in the modes that follow.
         """
+        from shaftwork.hybrid.modes.mode_machines import with_modes
+
         numbers = {id(element): k for k, element in enumerate(self._phases.elements)}
         steps: list[_ModeStep] = []
         for place, change in enumerate(changes):

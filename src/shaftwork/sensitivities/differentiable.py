@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from sympy import Symbol
@@ -13,10 +14,12 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.formulation.explicit_rows import Rows
-from shaftwork.frequency.analysis import Given
-from shaftwork.hybrid.phased_model import PhasedModel
+from shaftwork.pipeline.arguments import Given
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.motion_start import start_of
+from shaftwork.pipeline.prepared import EngineModel
+
+if TYPE_CHECKING:
+    from shaftwork.hybrid.phased_model import PhasedModel
 
 NO_DERIVATIVE = {
     "decisive": "decides which equations hold, so nothing is smooth in it. Give it a value that is not exactly zero, "
@@ -32,7 +35,7 @@ STILL = 1e-9
 """States that change by less than this part of the largest have not moved: that is rounding."""
 
 
-def rows_of(model: Model) -> Rows:
+def rows_of(model: EngineModel) -> Rows:
     """The symbolic equations of a model.
 
     Raises:
@@ -40,14 +43,14 @@ def rows_of(model: Model) -> Rows:
     """
     if model.rows is None:
         raise CompileError(
-            f"'{model.name}' has no symbolic equations to differentiate: it is too large, too closely coupled, or "
-            "holds waves. Take fewer elements, such as model=Lumped(10), or differences of two runs."
+            f"'{model.form.graph.name}' has no symbolic equations to differentiate: it is too large, too closely "
+            "coupled, or holds waves. Take fewer elements, such as model=Lumped(10), or differences of two runs."
         )
     return model.rows
 
 
 def smooth_parameters(
-    model: Model, names: Sequence[str] | None, used: Sequence[Model], span: tuple[float, float] | None = None
+    model: Model, names: Sequence[str] | None, used: Sequence[EngineModel], span: tuple[float, float] | None = None
 ) -> tuple[str, ...]:
     """The parameters by which to differentiate.
 
@@ -82,7 +85,7 @@ def smooth_parameters(
     return tuple(names)
 
 
-def _seeds(model: Model) -> Iterator[str]:
+def _seeds(model: EngineModel) -> Iterator[str]:
     graph = model.form.graph
     for branch in graph.branches:
         law = graph.in_network_symbols(branch.template.law, branch)
@@ -90,7 +93,7 @@ def _seeds(model: Model) -> Iterator[str]:
             yield from (symbol.name for symbol in noise.args[1].free_symbols)
 
 
-def _at_edges(model: Model, span: tuple[float, float]) -> Iterator[str]:
+def _at_edges(model: EngineModel, span: tuple[float, float]) -> Iterator[str]:
     """Parameters that move a switch of a law of time, or of a mode, which is at the start or at the end of a motion."""
     switching, p = model.switching, model.defaults
     instants = switching.timeline(p, *span)
@@ -144,9 +147,9 @@ def _start(
     model: Model, values: Mapping[str, float], initial: Given, span: tuple[float, float]
 ) -> tuple[tuple[str, ...], Array]:
     """The states by name, and where they start, in the equations in which nothing is joined."""
-    if not isinstance(model, PhasedModel):
-        return tuple(model.states), start_of(model, model.prepare(model.vector(values)), initial, span)[0]
-    phases = model.phases
+    if not model.phased:
+        return tuple(model.states), model.start(model.prepare(model.vector(values)), initial, span)[0]
+    phases = cast("PhasedModel", model).phases
     assembly = phases.assembly(phases.first)
     p = assembly.vector(values, phases.numbers(phases.first))
-    return tuple(assembly.model.states), start_of(assembly.model, assembly.prepared(p), initial, span)[0]
+    return tuple(assembly.model.states), assembly.model.start(assembly.prepared(p), initial, span)[0]

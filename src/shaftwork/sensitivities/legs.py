@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from sympy import Expr
@@ -12,20 +13,19 @@ from sympy import Expr
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.times.timeline import Timeline
 from shaftwork.core.errors import SimulationError
-from shaftwork.frequency.analysis import Given
-from shaftwork.hybrid.hybrid_run import HybridRun, Span
-from shaftwork.hybrid.hybrid_solution import solution
-from shaftwork.hybrid.hybrid_state import Change
-from shaftwork.hybrid.modes.mode_equations import ModeEquations
-from shaftwork.hybrid.modes.mode_machines import ModeNames
-from shaftwork.hybrid.phased_model import PhasedModel
-from shaftwork.hybrid.phases import Phases
 from shaftwork.numerics.zeros import LOOKS, zero
-from shaftwork.pipeline.arguments import Demand
+from shaftwork.pipeline.arguments import Demand, Given
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.motion_start import start_of
 from shaftwork.results.solution import Solution
 from shaftwork.sensitivities.differentiation import Differentiated
+
+if TYPE_CHECKING:
+    from shaftwork.hybrid.hybrid_run import HybridRun, Span
+    from shaftwork.hybrid.hybrid_state import Change
+    from shaftwork.hybrid.modes.mode_equations import ModeEquations
+    from shaftwork.hybrid.modes.mode_machines import ModeNames
+    from shaftwork.hybrid.phased_model import PhasedModel
+    from shaftwork.hybrid.phases import Phases
 
 SILENT = 1e-12
 """What stays within this part of its largest size is on no side: it has not changed it."""
@@ -151,13 +151,8 @@ def motion_of(model: Model, span: tuple[float, float], initial: Given, rtol: flo
     Raises:
         SimulationError: it could not be found, or a prescribed speed jumps.
     """
-    if isinstance(model, PhasedModel):
-        run = HybridRun(model.phases, {}, Demand(span, rtol, None, None, "auto", MOST_STEPS, None), by_combination=True)
-        run.march(initial)
-        legs, changes = tuple(_legs_of_run(run)), tuple(run.changes)
-        differentiated = DifferentiatedMotion(
-            solution(run, model.name), legs, changes, _start(run, initial), model.phases
-        )
+    if model.phased:
+        differentiated = _through_phases(cast("PhasedModel", model), span, initial, rtol)
     else:
         motion = model.simulate(span[1], t_start=span[0], initial=initial, rtol=rtol, t_eval="steps")
         differentiated = DifferentiatedMotion(motion, tuple(_legs_of_model(model, motion)))
@@ -165,11 +160,22 @@ def motion_of(model: Model, span: tuple[float, float], initial: Given, rtol: flo
     return differentiated
 
 
+def _through_phases(model: PhasedModel, span: tuple[float, float], initial: Given, rtol: float) -> DifferentiatedMotion:
+    """The motion of a network whose parts change their mode."""
+    from shaftwork.hybrid.hybrid_run import HybridRun
+    from shaftwork.hybrid.hybrid_solution import solution
+
+    run = HybridRun(model.phases, {}, Demand(span, rtol, None, None, "auto", MOST_STEPS, None), by_combination=True)
+    run.march(initial)
+    legs, changes = tuple(_legs_of_run(run)), tuple(run.changes)
+    return DifferentiatedMotion(solution(run, model.name), legs, changes, _start(run, initial), model.phases)
+
+
 def _start(run: HybridRun, initial: Given) -> Leg:
     phases, span = run.phases, run.demand.span
     assembly = phases.assembly(phases.first)
     p = assembly.vector({}, phases.numbers(phases.first))
-    x, _ = start_of(assembly.model, assembly.prepared(p), initial, span)
+    x, _ = assembly.model.start(assembly.prepared(p), initial, span)
     after = run.timeline(assembly, p).sides(span[0])[1]
     return Leg(
         start=span[0],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from sympy import Expr, Symbol
@@ -12,7 +13,6 @@ from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import AccuracyWarning, ParameterError, SimulationError
 from shaftwork.core.notices import warn
 from shaftwork.formulation.observables import Observables
-from shaftwork.hybrid.hybrid_state import Change
 from shaftwork.numerics.zeros import zero
 from shaftwork.pipeline.model import Model
 from shaftwork.sensitivities.carrying import End, SensitivityTransfer
@@ -21,6 +21,9 @@ from shaftwork.sensitivities.differentiation import Differentiated, ValueWithSlo
 from shaftwork.sensitivities.legs import DifferentiatedMotion, Leg, parted
 from shaftwork.sensitivities.saltation import ADVICE, TOGETHER, Jump, JumpConditions, by_chance
 from shaftwork.sensitivities.variation import Coefficients, Variation, variation
+
+if TYPE_CHECKING:
+    from shaftwork.hybrid.hybrid_state import Change
 
 ROUNDING = 1e-3
 """What a change of a parameter by all of itself does to a state is rounding below this part of the state's size."""

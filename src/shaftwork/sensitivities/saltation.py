@@ -14,18 +14,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from sympy import Expr
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import SimulationError
-from shaftwork.hybrid.hybrid_state import Change
 from shaftwork.pipeline.model import Model
 from shaftwork.sensitivities.carrying import End, SensitivityTransfer
 from shaftwork.sensitivities.differentiation import Differentiated
 from shaftwork.sensitivities.legs import Leg
+
+if TYPE_CHECKING:
+    from shaftwork.hybrid.hybrid_state import Change
 
 TOGETHER = 1e-9
 """Two causes act at once where the guard of the second is so near, as a part of the run."""
@@ -237,7 +239,8 @@ class JumpConditions:
 
     def _met(self, old: _Side, changes: Sequence[Change]) -> Iterator[tuple[float, _Cause]]:
         """Guards of what changes that are about to be met, and how soon in s."""
-        leg, first = old.leg, dict[int, Change]()
+        leg = old.leg
+        first: dict[int, Change] = {}
         if leg.assembly is None:
             return
         for change in changes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.linalg import norm
@@ -12,10 +13,7 @@ from sympy import Symbol
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import ParameterError, SimulationError
-from shaftwork.frequency.analysis import Given, Point, Time, operating_point
-from shaftwork.frequency.model_slopes import Complex
-from shaftwork.hybrid.phased_model import PhasedModel
-from shaftwork.pipeline.arguments import relative_tolerance, time_span
+from shaftwork.pipeline.arguments import Given, Point, Time, relative_tolerance, time_span
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import refuse_motion
 from shaftwork.results.course import SMALLEST, turning_points
@@ -26,6 +24,9 @@ from shaftwork.sensitivities.differentiation import Derivatives
 from shaftwork.sensitivities.legs import motion_of
 from shaftwork.sensitivities.motion_slopes import MotionSlopes
 from shaftwork.sensitivities.sensitivity_tables import FrequencySensitivities, MotionSensitivities
+
+if TYPE_CHECKING:
+    from shaftwork.frequency.model_slopes import Complex
 
 APART = 1e-6
 """Rates that differ by less than this part of themselves are one rate, which has no derivative of its own."""
@@ -60,7 +61,7 @@ def frequency_sensitivities(
         ParameterError: there is no such parameter.
         SimulationError: two modes that swing have the same rate.
     """
-    equations, p, x, time = _near(model, at, t)
+    equations, p, time, x, _ = model.point({}, at, t)
     names = smooth_parameters(model, parameters, (model, equations))
     derivatives = Derivatives(rows_of(equations), tuple(Symbol(name, real=True) for name in names))
     matrix = derivatives.by_states(time, x, p)
@@ -154,16 +155,6 @@ def motion_sensitivities(
     results = {name: measured(item, motion.solution, slopes, integrals) for name, item in measures.items()}
     values = {name: value for name, (value, _) in results.items()}
     return MotionSensitivities(model.name, nominal, values, {name: by for name, (_, by) in results.items()})
-
-
-def _near(model: Model, at: Point, t: Time) -> tuple[Model, Array, Array, float]:
-    """The equations that hold at a point, their parameters, the states and the time."""
-    if not isinstance(model, PhasedModel):
-        p = model.defaults
-        time, x = operating_point(model, p, at, t, model.settled(p))
-        return model, p, x, time
-    time, moment = model.point({}, at, t)
-    return moment.regime.assembly.model, moment.regime.p, moment.x, time
 
 
 def integrand(measure: Measure) -> tuple[str, int] | None:

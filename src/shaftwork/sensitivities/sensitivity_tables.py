@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shaftwork.core.errors import imported
-from shaftwork.frequency.model_slopes import Complex
-from shaftwork.frequency.natural_modes import damping_ratios, natural_frequencies
 from shaftwork.results.observer import Array
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from shaftwork.frequency.model_slopes import Complex
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,11 +36,15 @@ class FrequencySensitivities:
     @property
     def frequencies(self) -> Array:
         """(k,) natural frequencies |rate| / 2 pi, Hz."""
+        from shaftwork.frequency.natural_modes import natural_frequencies
+
         return natural_frequencies(self.rates)
 
     @property
     def damping(self) -> Array:
         """(k,) damping ratios -Re(rate) / |rate|."""
+        from shaftwork.frequency.natural_modes import damping_ratios
+
         return damping_ratios(self.rates)
 
     @property

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.frequency.analysis import Given, Point, Time
+from shaftwork.pipeline.arguments import Given, Point, Time, by_name
 from shaftwork.pipeline.network import Network, network_of
 from shaftwork.results.measures import Measure
 from shaftwork.sensitivities.sensitivities import frequency_sensitivities as of_frequencies
 from shaftwork.sensitivities.sensitivities import motion_sensitivities as of_motion
 from shaftwork.sensitivities.sensitivity_tables import FrequencySensitivities, MotionSensitivities
-from shaftwork.studies.study_arguments import by_name
 
 
 def frequency_sensitivities(

@@ -1,14 +1,22 @@
-"""Studies: variants of a network, and which model and engine reach an asked accuracy at the least cost."""
+"""Studies: variants of a network, and which model and engine reach an asked accuracy at the least cost.
+
+Those that are features of their own are loaded when they are first used.
+"""
 
 from __future__ import annotations
 
-from shaftwork.sensitivities.study import frequency_sensitivities, motion_sensitivities
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from shaftwork.studies.stability import Cell, Stability, stability
 from shaftwork.studies.stability_cases import Case
 from shaftwork.studies.work_precision import work_precision
 from shaftwork.studies.work_precision_result import Trial, WorkPrecision
-from shaftwork.sweep.sweep import sweep
-from shaftwork.sweep.sweep_result import Sweep
+
+if TYPE_CHECKING:
+    from shaftwork.sensitivities.study import frequency_sensitivities, motion_sensitivities
+    from shaftwork.sweep.sweep import sweep
+    from shaftwork.sweep.sweep_result import Sweep
 
 __all__ = [
     "Case",
@@ -23,3 +31,18 @@ __all__ = [
     "sweep",
     "work_precision",
 ]
+
+_HOME = {
+    "Sweep": "shaftwork.sweep.sweep_result",
+    "frequency_sensitivities": "shaftwork.sensitivities.study",
+    "motion_sensitivities": "shaftwork.sensitivities.study",
+    "sweep": "shaftwork.sweep.sweep",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Load a study that is a feature of its own."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'shaftwork.studies' has no attribute '{name}'")
+    value = globals()[name] = getattr(import_module(_HOME[name]), name)
+    return value

@@ -18,12 +18,12 @@ from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationErro
 from shaftwork.core.files import write_rows
 from shaftwork.core.screen import in_columns
 from shaftwork.integrate.engines import ENGINES, available
-from shaftwork.pipeline.arguments import NOMINAL
+from shaftwork.pipeline.arguments import NOMINAL, engine_names, several
 from shaftwork.pipeline.model import Model
 from shaftwork.results.observer import Array
 from shaftwork.results.plotting import new_figure
 from shaftwork.studies.stability_cases import CASES, TORQUE, Case
-from shaftwork.studies.study_arguments import engine_names, several, shaft_models, text_of
+from shaftwork.studies.study_arguments import shaft_models, text_of
 from shaftwork.studies.truth import ENDS, MOST_PREDICTED, ShaftMotion, exact, predicted
 from shaftwork.studies.work_precision_result import FLOOR
 

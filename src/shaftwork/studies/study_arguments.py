@@ -1,67 +1,13 @@
-"""What a user asks a study for, checked before anything runs: measures, engines, and models of a shaft."""
+"""The models of a shaft that a user asks a study for, checked before anything runs."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, TypeVar
+from collections.abc import Iterable, Sequence
 
 from shaftwork.components.shaft_models import CentralDifference, Lumped, OneSpring, ShaftModel, Spectral, Wave
 from shaftwork.core.errors import ParameterError
-from shaftwork.integrate.engines import ENGINES
-
-NAMES = ("auto", *ENGINES, "wave")
-"""What an engine may be called in a study."""
-
-Item = TypeVar("Item")
-
-
-def several(name: str, items: Iterable[Item]) -> tuple[Item, ...]:
-    """A sequence that a user gave.
-
-    Raises:
-        ParameterError: it is one text, whose letters nobody means, or no sequence.
-    """
-    if isinstance(items, str) or not isinstance(items, Iterable):
-        raise ParameterError(f"{name} = {items!r} must be a sequence. Write {name}=[{items!r}].")
-    return tuple(items)
-
-
-def by_name(measures: Any) -> dict[str, Any]:
-    """What a user wants measured, by the names given to it; of a list each measure is its own name.
-
-    Raises:
-        ParameterError: it is neither a mapping nor a list, there is nothing in it, or two have the same name.
-    """
-    if isinstance(measures, str):
-        measures = [measures]
-    if not isinstance(measures, Iterable):
-        raise ParameterError(f"measures = {measures!r} must be a list of names, such as ['max shaft.tau'].")
-    if not isinstance(measures, Mapping):
-        measures = {text: text for text in map(str, measures)}
-    if not measures:
-        raise ParameterError("Name a measure, such as measures=['max shaft.tau'].")
-    if twice := repeated(map(str, measures)):
-        raise ParameterError(f"Two measures are called '{twice}'. Give each a name of its own.")
-    return {str(name): measure for name, measure in measures.items()}
-
-
-def repeated(names: Iterable[str]) -> str:
-    """The first name that is there twice; empty where none is."""
-    return next((name for name, count in Counter(names).items() if count > 1), "")
-
-
-def engine_names(engines: Iterable[str]) -> tuple[str, ...]:
-    """Engines by name.
-
-    Raises:
-        ParameterError: there is no such engine.
-    """
-    names = several("engines", engines)
-    if unknown := [name for name in names if name not in NAMES]:
-        raise ParameterError(f"There is no engine {unknown[0]!r}. Take some of: {', '.join(NAMES)}.")
-    return names
+from shaftwork.pipeline.arguments import several
 
 
 def shaft_models(models: Iterable[ShaftModel | str]) -> tuple[ShaftModel, ...]:

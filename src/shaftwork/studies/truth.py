@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import expm
@@ -22,11 +23,13 @@ from shaftwork.components.shaft_models import OneSpring, Rigid, ShaftModel, Spec
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import AccuracyWarning, ShaftworkError
 from shaftwork.core.notices import muted
-from shaftwork.frequency.natural_modes import Modes
 from shaftwork.pipeline.network import Network
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
 from shaftwork.studies.stability_cases import TORQUE, Case
+
+if TYPE_CHECKING:
+    from shaftwork.frequency.natural_modes import Modes
 
 QUANTITIES = ("tau_a", "tau_b", "tau_mid", "omega_a", "omega_b")
 """What is compared: torque at both ends and in the middle, speed of both ends."""

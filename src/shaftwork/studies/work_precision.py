@@ -16,11 +16,12 @@ from shaftwork.components.shaft_models import ShaftModel
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError, in_one_line
 from shaftwork.core.parameters import in_si, whole
+from shaftwork.pipeline.arguments import engine_names, several
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.network import Network
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
-from shaftwork.studies.study_arguments import LADDER, engine_names, several, shaft_models, text_of
+from shaftwork.studies.study_arguments import LADDER, shaft_models, text_of
 from shaftwork.studies.truth import (
     COARSE,
     MODES,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -17,10 +17,6 @@ from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import CompileError, NetworkError
-from shaftwork.hybrid.modes.mode_equations import ModeEquations
-from shaftwork.hybrid.modes.mode_machines import ModeNames, with_modes
-from shaftwork.hybrid.phased_model import PhasedModel
-from shaftwork.hybrid.starts import conditional
 from shaftwork.network.graph import GraphPart
 from shaftwork.pipeline.model import Model
 from shaftwork.results.measures import Measure
@@ -29,6 +25,7 @@ from shaftwork.sweep.ensemble_equations import (
     POWERS,
     EnsembleCode,
     EnsembleEquations,
+    ModeNames,
     PhaseEntry,
     VariantGroup,
     joined,
@@ -45,7 +42,6 @@ SAME = 1e-9
 ON, OVER, LOST = -1, -2, -3
 """What a lane has met where that is no guard: nothing, the end of the motion, and what it cannot pass."""
 FADING = "A law fades to a constant, as exp and tanh do, and a long step might pass over where it changes."
-CLOCKED = "A limit at which a mode ends changes with the time by itself, and a long step might pass over that."
 
 
 class Ensemble:
@@ -74,7 +70,7 @@ class Ensemble:
     ) -> None:
         self.model, self.names, self.measures = model, tuple(names), tuple(measures)
         self.span, self.rtol = span, rtol
-        self._first = dict(first)
+        self.first = dict(first)
         self._equations: dict[ModeNames, EnsembleEquations | str] = {}
         self._codes: dict[Model, EnsembleCode] = {}
         self.room = Room()
@@ -115,19 +111,9 @@ class Ensemble:
                 same[lane] &= not assembly.degenerates(model.vector(dict(zip(self.names, column, strict=True))))
         return np.asarray(same)
 
-    @property
-    def phased(self) -> PhasedModel | None:
-        """The model, where parts change their mode."""
-        return self.model if isinstance(self.model, PhasedModel) else None
-
-    def _first_modes(self, values: Mapping[str, float]) -> ModeNames:
+    def _first_modes(self, values: Mapping[str, float]) -> ModeNames:  # noqa: ARG002
         """The modes in which a variant starts."""
-        if self.phased is None:
-            return ()
-        phases = self.phased.phases
-        assembly = phases.assembly(phases.first)
-        p = assembly.vector(dict(values), phases.numbers(phases.first))
-        return assembly.first_modes(self.span[0], np.zeros(len(assembly.model.states)), p)
+        return ()
 
     def starts_alike(self, column: Array) -> bool:
         """Whether the values (names,) of the parameters that vary leave the modes at the start as they are."""
@@ -137,27 +123,34 @@ class Ensemble:
         """The equations of a combination of modes, or None where variants cannot run side by side in them."""
         if modes not in self._equations:
             try:
-                assembly = None if self.phased is None else self.phased.phases.assembly(modes)
-                code = self._code(assembly)
-                self._equations[modes] = EnsembleEquations(code, assembly, modes, self._first, self.names, self.span)
+                self._equations[modes] = self._equations_in(modes)
             except (CompileError, NetworkError) as error:
                 self._equations[modes] = str(error)
         equations = self._equations[modes]
         return None if isinstance(equations, str) else equations
 
-    def _code(self, assembly: ModeEquations | None) -> EnsembleCode:
-        """The programs of a set of equations, which several combinations of modes may share."""
-        model = self.model if assembly is None else assembly.model
+    def _equations_in(self, modes: ModeNames) -> EnsembleEquations:  # noqa: ARG002
+        """The equations of a combination of modes.
+
+        Raises:
+            CompileError: variants cannot run side by side in them.
+            NetworkError: they contradict each other.
+        """
+        model, base = self.model, self.model.vector(self.first)
+        prepared = model.prepare(base)
+        bound = prepared.symbolic()
+        code = self.code_of(model, None if bound is None else bound.program, StateTransfer(model.form))
+        return EnsembleEquations(code, base, prepared.atol.tolist(), self.names)
+
+    def code_of(self, model: Model, program: Any, stores: StateTransfer) -> EnsembleCode:
+        """The programs of a set of equations, which several combinations of modes may share.
+
+        Raises:
+            CompileError: variants cannot run side by side in them.
+        """
         if model not in self._codes:
-            if assembly is None:
-                bound = model.prepare(model.vector(self._first)).symbolic()
-                program, stores = None if bound is None else bound.program, StateTransfer(model.form)
-            else:
-                program, stores = assembly.program, assembly.stores
             if program is not None and program.fading:
                 raise CompileError(FADING)
-            if assembly is not None and assembly.clocks:
-                raise CompileError(CLOCKED)
             self._codes[model] = EnsembleCode(model, program, stores, self.measures)
         return self._codes[model]
 
@@ -172,33 +165,14 @@ class Ensemble:
         """
         return _VariantCourse(self, columns).go()
 
-    @cached_property
+    @property
     def decisive(self) -> bool:
         """Whether a parameter that varies decides in which mode a motion starts."""
-        if self.phased is None:
-            return False
-        elements = self.phased.phases.elements
-        symbols = {
-            f"{element.part.name}.{symbol.name}" for element in elements for symbol in conditional(element.modes)
-        }
-        return not symbols.isdisjoint(self.names)
+        return False
 
-    def after(self, group: VariantGroup, guard: int, p: Array) -> list[tuple[ModeNames, Mask]]:
-        """The modes to which a guard leads by itself, and the lanes (k,) that go there."""
-        phased = self.phased
-        assert phased is not None  # noqa: S101 (only its lanes meet guards)
-        assembly = phased.phases.assembly(group.modes)
-        met = [active for active in assembly.watched(group.modes) if active.guard == guard]
-        if len(met) != 1 or met[0].leave.rebound is not None:
-            return []
-        ended, number, count = met[0], met[0].element, group.lanes.size
-        names = [ended.leave.to] * count
-        if not ended.leave.to:
-            before, parameters = group.modes[number], p[: len(assembly.model.parameters)]
-            starts = zip(group.t.tolist(), group.x.T, parameters.T, strict=True)
-            names = [assembly.start_of(number, before, *start) for start in starts]
-        targets = dict.fromkeys(names)
-        return [(with_modes(group.modes, {number: to}), np.array([name == to for name in names])) for to in targets]
+    def after(self, group: VariantGroup, guard: int, p: Array) -> list[tuple[ModeNames, Mask]]:  # noqa: ARG002
+        """The modes to which a guard leads by itself, and the lanes (k,) that go there; there is no guard."""
+        return []
 
 
 class _VariantCourse:

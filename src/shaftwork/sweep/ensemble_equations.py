@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -13,11 +13,6 @@ from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.core.errors import CompileError
 from shaftwork.formulation.observables import Observables
-from shaftwork.hybrid.hybrid_state import AHEAD, AHEAD_OF_RUN, CLEAR, EPS, GOLDEN, NOTHING, ROUNDINGS
-from shaftwork.hybrid.modes.exceeded_guards import FEW
-from shaftwork.hybrid.modes.mode_equations import ModeEquations
-from shaftwork.hybrid.modes.mode_machines import ModeNames
-from shaftwork.pipeline.arguments import NOMINAL
 from shaftwork.pipeline.model import Model
 from shaftwork.results.measures import Measure
 from shaftwork.sweep.lane_extremes import Index, Mask
@@ -28,8 +23,8 @@ EXTREMES = {"max": (1.0,), "min": (-1.0,), "peak": (1.0, -1.0)}
 """Measures that are the largest value of a quantity, times these signs."""
 POWERS = {"mean": 1, "rms": 2}
 """Measures that are integrals of a quantity to some power."""
-Course = tuple[Array, Array, Array, Array]
-"""Times (k,), states (n, k), their rates, and guards (guards, k)."""
+ModeNames = tuple[str, ...]
+"""The mode of every element; empty where no part changes its mode."""
 
 
 class EnsembleCode:
@@ -123,36 +118,22 @@ class EnsembleEquations:
 
     Args:
         code: its programs.
-        assembly: the equations with their guards, or None where nothing changes its mode.
-        modes: the combination.
-        first: a variant, of which sizes are taken.
+        base: the parameter vector of a variant.
+        sizes: (n,) nominal size of each state, as of that variant.
         names: of the parameters that vary.
-        span: start and end of the motion, s.
     """
 
-    def __init__(
-        self,
-        code: EnsembleCode,
-        assembly: ModeEquations | None,
-        modes: ModeNames,
-        first: Mapping[str, float],
-        names: Sequence[str],
-        span: tuple[float, float],
-    ) -> None:
-        self.code, model = code, code.model
-        if assembly is None:
-            self._base = model.vector(first)
-            self.sides, sizes = np.zeros(0), model.prepare(self._base).atol.tolist()
-        else:
-            pairs = zip(assembly.elements, modes, strict=True)
-            numbers = {element.number: element.modes[name].value for element, name in pairs}
-            self._base = assembly.vector(first, numbers)
-            self.sides, sizes = assembly.sides(modes), assembly.sizes(self._base)
-        places = {name: k for k, name in enumerate(model.parameters)}
+    def __init__(self, code: EnsembleCode, base: Array, sizes: Sequence[float], names: Sequence[str]) -> None:
+        self.code, self._base, self.sizes = code, base, np.array(sizes)
+        places = {name: k for k, name in enumerate(code.model.parameters)}
         self._places = [(places[name], column) for column, name in enumerate(names) if name in places]
-        self.watched, self.sizes = np.flatnonzero(self.sides), np.array(sizes)
-        self._tick = ROUNDINGS * float(np.spacing(max(map(abs, span))))
-        self._ahead = AHEAD_OF_RUN * (span[1] - span[0])
+        self.sides: Array = np.zeros(0)
+        """(guards,) on which each guard is met; 0 where it ends none of the modes."""
+
+    @property
+    def watched(self) -> Index:
+        """The guards that end one of the modes."""
+        return np.flatnonzero(self.sides)
 
     def parameters(self, columns: Array) -> Array:
         """(parameters, k) for the values (names, k) of those that vary, with what is derived from them."""
@@ -161,51 +142,9 @@ class EnsembleEquations:
             p[place] = columns[column]
         return self.code.program.parameters(p)
 
-    def entered(self, t: Array, x: Array, p: Array) -> PhaseEntry:
-        """Whether every guard is on its own side, or on its limit and about to be, as `EventIteration` would find.
-
-        Args:
-            t: (k,) s.
-            x: (n, k) states.
-            p: (parameters, k).
-        """
-        if not len(self.sides):
-            return PhaseEntry(np.ones(t.size, dtype=bool), np.zeros((0, t.size)))
-        rates, now = self.code.motion(t, x, p)
-        moved = self._rounded(x, rates)
-        near_rates, near = self.code.motion(t + self._tick, moved, p)
-        side, bands, step = self.sides[:, None], np.abs(near - now), self._step(rates)
-        value = side * now
-        falls, decided = np.zeros_like(value, dtype=bool), np.zeros_like(value, dtype=bool)
-        here, beside = (t, x, rates, now), (t + self._tick, moved, near_rates, near)
-        for _ in range(2):  # where nothing moves yet, its acceleration tells
-            here, beside = self._later(step, here, p), self._later(step, beside, p)
-            gain, other = side * (here[3] - now), side * (beside[3] - near)
-            sure = np.abs(gain) > np.maximum(np.abs(gain - other), FEW * bands / ROUNDINGS)
-            falls |= ~decided & sure & (gain < 0)
-            decided |= sure
-        good = (value < -bands) | ((value <= bands) & falls)
-        clear = np.where(2 * value > -CLEAR * bands, np.maximum(value, 0.0) + CLEAR * bands, bands)
-        return PhaseEntry(np.all(good[self.watched], axis=0), np.maximum(clear, NOTHING))
-
-    def _rounded(self, x: Array, rates: Array) -> Array:
-        """The states so far away as rounding may move them, and the time by a tick; see `moments.Regime.rounded`."""
-        signs = np.array([(-1.0) ** k for k in range(len(x))])[:, None]
-        part = signs * np.array([(0.5 + k * GOLDEN % 1) * ROUNDINGS * EPS for k in range(len(x))])[:, None]
-        least = part * self.sizes[:, None] / NOMINAL
-        return np.asarray(x + part * np.abs(x) + least + signs * self._tick * np.abs(rates))
-
-    def _step(self, rates: Array) -> Array:
-        """(k,) how far in s the further course is looked at."""
-        with np.errstate(divide="ignore"):
-            steps = (AHEAD * self.sizes[:, None] / np.abs(rates)).min(axis=0)
-        return np.asarray(np.minimum(self._ahead, steps))
-
-    def _later(self, step: Array, course: Course, p: Array) -> Course:
-        """A step further along a straight line."""
-        t, x, rates, _ = course
-        later = x + step * rates
-        return t + step, later, *self.code.motion(t + step, later, p)
+    def entered(self, t: Array, x: Array, p: Array) -> PhaseEntry:  # noqa: ARG002
+        """Whether the modes are consistent with the motion in lanes (k,): without guards they are."""
+        return PhaseEntry(np.ones(t.size, dtype=bool), np.zeros((0, t.size)))
 
     def leaves_behind(self, before: EnsembleEquations, guard: int) -> bool:
         """Whether the guard by which these modes were entered is met no more; `entered` looks at all the others."""

@@ -16,14 +16,21 @@ from shaftwork.core.notices import muted
 from shaftwork.core.parameters import whole, without_unit
 from shaftwork.core.screen import progress
 from shaftwork.network.netlist import Netlist
-from shaftwork.pipeline.arguments import OutputTimes, checked_parameter, relative_tolerance, time_span
+from shaftwork.pipeline.arguments import (
+    OutputTimes,
+    by_name,
+    checked_parameter,
+    engine_names,
+    relative_tolerance,
+    repeated,
+    time_span,
+)
 from shaftwork.pipeline.motion_start import ending_of, refuse_motion, time_of_start
 from shaftwork.pipeline.network import Network, network_of
 from shaftwork.results.fatigue import SNLine
 from shaftwork.results.measures import Measure
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
-from shaftwork.studies.study_arguments import by_name, engine_names, repeated
 from shaftwork.sweep.sweep_result import VERDICTS, Limits, Sweep
 from shaftwork.sweep.sweep_store import Store
 from shaftwork.sweep.sweep_task import Chunk, Reader, Task, Worker, chunks

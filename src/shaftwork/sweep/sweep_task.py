@@ -34,7 +34,7 @@ from shaftwork.core.errors import (
 from shaftwork.core.notices import muted
 from shaftwork.integrate.engines import available
 from shaftwork.network.netlist import Netlist
-from shaftwork.pipeline.model import steady_start
+from shaftwork.pipeline.model import Model, steady_start
 from shaftwork.pipeline.motion_start import Ending
 from shaftwork.pipeline.network import Network
 from shaftwork.results.fatigue import SNLine
@@ -146,12 +146,10 @@ class Worker:
         self.why = next((reason for reason, holds in reasons.items() if holds), "")
         if self.why:
             return None
-        from shaftwork.sweep.ensemble import Ensemble
-
-        span, names = (0.0, task.t_end), tuple(task.columns)
+        kind, span, names = _kind_of(self._model), (0.0, task.t_end), tuple(task.columns)
         for first in (task.values(0), {}):  # the network itself, where the first variant fails
             try:
-                return Ensemble(self._model, names, first, read, span, options["rtol"])
+                return kind(self._model, names, first, read, span, options["rtol"])
             except CompileError as error:
                 reason = str(error).splitlines()[0].rstrip(".")
                 self.why = reason[0].lower() + reason[1:]
@@ -222,6 +220,17 @@ class Worker:
                 return nothing, f"measure '{name}' is {value}"
             values.append(value)
         return np.array(values), ""
+
+
+def _kind_of(model: Model) -> type[Ensemble]:
+    """What runs variants of a network side by side."""
+    if model.phased:
+        from shaftwork.sweep.phased_ensemble import PhasedEnsemble
+
+        return PhasedEnsemble
+    from shaftwork.sweep.ensemble import Ensemble
+
+    return Ensemble
 
 
 def _checked(part: Component) -> set[str]:

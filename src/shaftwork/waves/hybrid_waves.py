@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cached_property, partial
-from typing import Any
 
 import numpy as np
 
@@ -18,12 +17,12 @@ from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.waves import WaveSystem
 from shaftwork.hybrid.hybrid_state import Regime
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
-from shaftwork.integrate.problem import Problem, Trajectory
+from shaftwork.integrate.problem import Problem, TimedProblem, Trajectory, changed
 from shaftwork.pipeline.arguments import NOMINAL
-from shaftwork.waves.delay_engine.lines import DelayProblem, Lines
+from shaftwork.waves.delay_engine.lines import Lines
 from shaftwork.waves.delay_engine.march import March, MarchEquations
 from shaftwork.waves.delay_engine.waveforms import Left
-from shaftwork.waves.wave_motion import CarriedWaves, WaveStart, checked_lines, lines_by_shaft
+from shaftwork.waves.wave_motion import CarriedWaves, WaveStart, checked_lines, delay_problem, lines_by_shaft
 
 RATE = "rate of "
 
@@ -84,54 +83,24 @@ class WaveRun:
         self._system, self._span = WaveSystem(bound), span
         self.lines: Mapping[str, Array] = lines_by_shaft(bound, self._system)
         checked_lines(bound, self._system, start, span[1] - span[0], linear=False)
-        self._start: dict[str, Any] = {}
-        if isinstance(start, CarriedWaves):
-            self._start = {"past": start.past}
-        elif start is not None:
-            self._start = {"speeds0": start.speeds, "torque0": start.torques}
+        self._start = start
         self._march: March | None = None
         self._equations: dict[Regime, MarchEquations] = {}
 
     def arriving(self, t: float) -> Array:
         """(2 q,) what arrives at the ends of the lines at a time in s, and its rates."""
-        march = self._march or March(self._delayed(self._system, np.zeros(0), t), self._span)
-        return march.arriving(t)
-
-    def _delayed(self, system: WaveSystem, x: Array, t: float, **others: Any) -> DelayProblem:
-        impedances, delays = self._system.lines
-        defaults: dict[str, Any] = {"t_end": self._span[1], "names": (), "atol": np.zeros(x.size)}
-        return DelayProblem(
-            rhs=system.rhs,
-            speeds=system.speeds,
-            jacobian=system.jacobian,
-            delays=delays,
-            impedances=impedances,
-            x0=x,
-            t0=t,
-            **defaults | self._start | others,
-        )
+        if self._march is not None:
+            return self._march.arriving(t)
+        nothing = np.zeros(0)
+        before = TimedProblem(x0=nothing, t0=t, t_end=self._span[1], names=(), atol=nothing)
+        return March(delay_problem(self._system, before, self._start), self._span).arriving(t)
 
     def solve(self, regime: Regime, problem: Problem) -> Trajectory:
         """One span of the motion, in the modes of a regime; states, and behind them what arrives."""
         assembly = regime.assembly
-        size = len(assembly.model.states)
-        delayed = self._delayed(
-            WaveSystem(assembly.bound(regime.p)),
-            problem.x0[:size],
-            problem.t0,
-            t_end=problem.t_end,
-            names=problem.names,
-            atol=problem.atol,
-            rtol=problem.rtol,
-            sides=problem.sides,
-            t_eval=problem.t_eval,
-            explain=problem.explain,
-            max_steps=problem.max_steps,
-            earlier_steps=problem.earlier_steps,
-            progress=problem.progress,
-            guards=problem.guards,
-            timed=assembly.timed,
-            linear=assembly.model.linear,
+        system, x = WaveSystem(assembly.bound(regime.p)), problem.x0[: len(assembly.model.states)]
+        delayed = delay_problem(
+            system, changed(problem, x0=x), self._start, timed=assembly.timed, linear=assembly.model.linear
         )
         with np.errstate(all="ignore"):
             if self._march is None:

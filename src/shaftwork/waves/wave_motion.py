@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from shaftwork.core.errors import AccuracyWarning, NetworkWarning, ParameterErro
 from shaftwork.core.notices import warn
 from shaftwork.core.times import just_after
 from shaftwork.formulation.form import StateForm
-from shaftwork.integrate.problem import Problem, Trajectory
+from shaftwork.integrate.problem import Problem, TimedProblem, Trajectory
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import Netlist
 from shaftwork.waves.delay_engine.collocation import POWERS
@@ -205,38 +206,26 @@ def solve_waves(
         NetworkWarning: a line is so short, and beside it something so nonlinear, that the run hardly ends.
     """
     system = WaveSystem(bound)
-    impedances, delays = system.lines
-    carried = start if isinstance(start, CarriedWaves) else None
     checked_lines(bound, system, start, problem.t_end - problem.t0, linear=linear)
-    delayed = DelayProblem(
-        rhs=system.rhs,
-        speeds=system.speeds,
-        jacobian=system.jacobian,
-        delays=delays,
-        impedances=impedances,
-        x0=problem.x0,
-        t0=problem.t0,
-        t_end=problem.t_end,
-        names=problem.names,
-        atol=problem.atol,
-        rtol=problem.rtol,
-        breakpoints=problem.breakpoints,
-        jump=problem.jump,
-        sides=problem.sides,
-        t_eval=problem.t_eval,
-        explain=problem.explain,
-        max_steps=problem.max_steps,
-        progress=problem.progress,
-        linear=linear,
-        steady=steady,
-        speeds0=start.speeds if isinstance(start, WaveStart) else None,
-        torque0=start.torques if isinstance(start, WaveStart) else None,
-        past=None if carried is None else carried.past,
-    )
+    delayed = delay_problem(system, problem, start, linear=linear, steady=steady)
     trajectory = solve(delayed)
     x = np.hstack([trajectory.x, trajectory.h])
-    dense = _StatesAndWaves(trajectory, past_of(delayed), impedances, lines_by_shaft(bound, system))
+    dense = _StatesAndWaves(trajectory, past_of(delayed), delayed.impedances, lines_by_shaft(bound, system))
     return Trajectory(trajectory.t, x, dense, trajectory.statistics)
+
+
+def delay_problem(
+    system: WaveSystem, problem: TimedProblem, start: WaveStart | CarriedWaves | None, **others: Any
+) -> DelayProblem:
+    """A problem whose model has lines, with others of its values, as the delay engine takes it."""
+    impedances, delays = system.lines
+    told: dict[str, Any] = {item.name: getattr(problem, item.name) for item in dataclasses.fields(TimedProblem)}
+    if isinstance(start, CarriedWaves):
+        told["past"] = start.past
+    elif start is not None:
+        told |= {"speeds0": start.speeds, "torque0": start.torques}
+    told |= {"rhs": system.rhs, "speeds": system.speeds, "jacobian": system.jacobian}
+    return DelayProblem(**{**told, "impedances": impedances, "delays": delays, **others})
 
 
 def checked_lines(

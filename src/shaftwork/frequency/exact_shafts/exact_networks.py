@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping
 from functools import cached_property, partial
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -20,10 +20,7 @@ from shaftwork.core.errors import AccuracyWarning, NetworkWarning, ParameterErro
 from shaftwork.core.kept import Kept
 from shaftwork.core.notices import muted
 from shaftwork.frequency.analysis import (
-    Names,
-    Point,
     SmallMotions,
-    Time,
     about,
     input_names,
     moment_of,
@@ -35,12 +32,14 @@ from shaftwork.frequency.exact_shafts.exact_lines import ExactLines, ExactSlopes
 from shaftwork.frequency.linear_model import ExactModel
 from shaftwork.frequency.linearization import Linearization
 from shaftwork.frequency.natural_modes import Modes, find_modes
-from shaftwork.hybrid.modes.mode_machines import ModeNames
-from shaftwork.hybrid.phased_model import PhasedModel
 from shaftwork.network.graph import resolve
 from shaftwork.network.netlist import Netlist, Placed
+from shaftwork.pipeline.arguments import Names, Point, Time
 from shaftwork.pipeline.model import Model
 from shaftwork.results.solution import Solution
+
+if TYPE_CHECKING:
+    from shaftwork.hybrid.phased_model import PhasedModel
 
 Compile = Callable[[Netlist], Model]
 OWN = Spectral(16)
@@ -60,8 +59,8 @@ def small_motions(model: Model, compiled: Compile, *, every: bool) -> SmallMotio
         every: whether all its shafts are exact, or those alone that are waves.
     """
     shafts = exact_shafts(model.netlist, every=every)
-    if shafts and isinstance(model, PhasedModel):
-        return ExactPhases(model, compiled, shafts).near
+    if shafts and model.phased:
+        return ExactPhases(cast("PhasedModel", model), compiled, shafts).near
     if shafts:
         return ExactNetwork(model, compiled, shafts).near
     return model.near
@@ -220,14 +219,13 @@ class ExactPhases:
 
     def __init__(self, model: PhasedModel, compiled: Compile, shafts: Mapping[str, Shaft]) -> None:
         self._model, self._compiled, self._shafts = model, compiled, shafts
-        self._networks = Kept[ModeNames, ExactNetwork](MESHES)
+        self._networks = Kept[tuple[str, ...], ExactNetwork](MESHES)
 
     @cached_property
     def _own(self) -> PhasedModel:
         """The network with meshes in place of waves, which tells the modes at a point."""
-        model = _without_waves(self._model, self._compiled, self._shafts)
-        assert isinstance(model, PhasedModel)  # noqa: S101 (its other parts are the same)
-        return model
+        meshed = _without_waves(self._model, self._compiled, self._shafts)
+        return cast("PhasedModel", meshed)  # its other parts are the same
 
     def near(self, at: Point, t: Time = None, inputs: Names = ()) -> ExactModel:
         """The network near a point, in the modes that go on there; arguments as for `Model.linearize`.
@@ -237,14 +235,14 @@ class ExactPhases:
             SimulationError: a law has no finite slope at the point.
         """
         point, t = _on_meshes(at, t, self._model, self._own, tuple(self._shafts))
-        time, moment = self._own.point({}, point, t)
+        time, moment = self._own.moment_at({}, point, t)
         modes = moment.regime.modes
         network = self._networks(modes, lambda: ExactNetwork(self._in(modes), self._compiled, self._shafts))
         phase = self._model.words(moment)
         title = titled(self._model.name, about(self._model, at, time), phase)
         return network.around(time, moment.x, inputs, title, phase)
 
-    def _in(self, modes: ModeNames) -> Model:
+    def _in(self, modes: tuple[str, ...]) -> Model:
         """The network in one phase."""
         phases, chosen = self._model.phases, dict[str, tuple[ModeChoice, ...]]()
         netlist = phases.assembly(modes).model.netlist

@@ -1,27 +1,22 @@
-"""The table of a reduction: every parameter before and after, with its formula, as text and as LaTeX."""
+"""The table of a reduction as LaTeX: every parameter before and after, with its formula."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from typing import Any
 
 from sympy import Add, Expr, Integer, Symbol, latex
 
 from shaftwork.components.laws import omega, phi, s, v
 from shaftwork.components.tables import Table
-from shaftwork.core.errors import SignalError
-from shaftwork.core.screen import in_columns
 from shaftwork.equations.assembly import FactoredTerms
 from shaftwork.equations.spelling import escaped, in_text, without_marks
 from shaftwork.latex.nomenclature import column, unit
 from shaftwork.latex.nomenclature import table as longtable
 from shaftwork.latex.printing import Line, Writer, aligned, printed_number, printed_width
-from shaftwork.reduce.referred_parts import Entry
+from shaftwork.reduce.referred_parts import Entry, formula_of, symbol_of
 
-HEADINGS = ("part", "quantity", "value", "unit", "ratio", "referred", "unit", "formula")
 PART, FORMULA, LETTER = 20, 42, 2
 """Width of the names of parts, that of the formulas and about that of a letter in print, mm."""
 MOTION = {omega.name: r"\omega", phi.name: r"\varphi", v.name: "v", s.name: "s"}
@@ -32,44 +27,18 @@ SCRIPT = 0.75
 """Size of what is in a fraction beside text."""
 TIMES, BREAKS = r" \, ", r" \,\allowbreak "
 """Between factors; where a line may end."""
-WIDEST = 28
-"""Characters of a law in the text; a longer one is cut."""
 
 
-@dataclass(frozen=True, eq=False)
-class ReductionTable:
-    """What became of every parameter at a reference shaft.
+class ReductionPrint:
+    """The table of a reduction in print.
 
     Args:
-        to: node of the reference shaft.
         entries: in the order of the network.
-        read_names: gives LaTeX of the symbols of the network by name, when it is asked for.
+        read_names: gives LaTeX of the symbols of the network by name.
     """
 
-    to: str
-    entries: tuple[Entry, ...]
-    read_names: Callable[[], Mapping[str, str]]
-
-    def __len__(self) -> int:
-        return len(self.entries)
-
-    def __iter__(self) -> Iterator[Entry]:
-        return iter(self.entries)
-
-    def __getitem__(self, name: str) -> Entry:
-        """The entry of a parameter, "shaft.c".
-
-        Raises:
-            SignalError: there is none.
-        """
-        by_name = {f"{entry.part}.{entry.quantity}": entry for entry in self.entries}
-        if name not in by_name:
-            raise SignalError(f"No parameter '{name}' was referred to '{self.to}'. There are: {', '.join(by_name)}.")
-        return by_name[name]
-
-    def __str__(self) -> str:
-        lines = in_columns([HEADINGS, *map(_cells, self.entries)])
-        return "\n".join((f"referred to {self.to}", *lines))
+    def __init__(self, entries: Sequence[Entry], read_names: Callable[[], Mapping[str, str]]) -> None:
+        self.entries, self.read_names = entries, read_names
 
     def latex(self) -> str:
         """The table as LaTeX, a `longtable` in the letters of the equations; what is a law stands below it.
@@ -86,13 +55,13 @@ class ReductionTable:
 
     def _laws(self, entry: Entry) -> tuple[Line, Line]:
         """A law as it is and as it is at the reference shaft, which reads the motion there."""
-        letter, there = self._names[_own(entry)], {name: f"{text}'" for name, text in MOTION.items()}
+        letter, there = self._names[symbol_of(entry)], {name: f"{text}'" for name, text in MOTION.items()}
         return Line(letter, _pieces(entry.value, MOTION)), Line(_primed(letter), _pieces(entry.referred, there))
 
     @cached_property
     def _names(self) -> Mapping[Symbol, str]:
         letters = {name: without_marks(text) for name, text in self.read_names().items()}
-        symbols = {symbol for entry in self.entries for symbol in (_own(entry), *entry.factor.free_symbols)}
+        symbols = {symbol for entry in self.entries for symbol in (symbol_of(entry), *entry.factor.free_symbols)}
         return {symbol: letters.get(symbol.name) or _fallback(symbol.name) for symbol in symbols}
 
     def _printed(self, entry: Entry) -> tuple[str, ...]:
@@ -111,9 +80,9 @@ class ReductionTable:
 
         Where a letter alone is wider than the column, by the name of its part, the formula is that of the text.
         """
-        letter = self._names[_own(entry)]
+        letter = self._names[symbol_of(entry)]
         if any(printed_width(letter) > FORMULA / LETTER for letter in (_primed(letter), *self._letters_in(entry))):
-            return _broken(_formula(entry), FORMULA)
+            return _broken(formula_of(entry), FORMULA)
         above, below = entry.factor.as_numer_denom()
         sign = "-" if above.could_extract_minus_sign() else ""
         upper, lower = (letter, *self._factors(-above if sign else above)), self._factors(below)
@@ -128,7 +97,7 @@ class ReductionTable:
         return f"${_primed(letter)} = {sign}{law}$"
 
     def _letters_in(self, entry: Entry) -> tuple[str, ...]:
-        return tuple(self._names[symbol] for symbol in (_own(entry), *entry.factor.free_symbols))
+        return tuple(self._names[symbol] for symbol in (symbol_of(entry), *entry.factor.free_symbols))
 
     def _factors(self, product: Expr) -> tuple[str, ...]:
         """A product as LaTeX, factor by factor; nothing where it is one."""
@@ -139,32 +108,6 @@ class ReductionTable:
         texts = (latex(factor, symbol_names=names, mul_symbol=TIMES) for factor in factors)
         sums = (factor.is_Add for factor in factors)
         return tuple(rf"\left({text}\right)" if total else text for text, total in zip(texts, sums, strict=True))
-
-
-def _own(entry: Entry) -> Symbol:
-    return Symbol(f"{entry.part}.{entry.quantity}", real=True)
-
-
-def _formula(entry: Entry) -> str:
-    above, below = entry.factor.as_numer_denom()
-    text = str(_own(entry)) if above == 1 else f"{_own(entry)} * {_bracketed(above)}"
-    return text if below == 1 else f"{text} / {_bracketed(below)}"
-
-
-def _bracketed(product: Expr) -> str:
-    return f"({product})" if product.args and not product.is_Pow else str(product)
-
-
-def _cells(entry: Entry) -> tuple[str, ...]:
-    value, ratio, referred = (_text(number) for number in (entry.value, entry.ratio, entry.referred))
-    return (entry.part, entry.quantity, value, entry.unit, ratio, referred, entry.referred_unit, _formula(entry))
-
-
-def _text(value: Any) -> str:
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    shown = str(value)
-    return shown if len(shown) <= WIDEST else f"{shown[: WIDEST - 4]} ..."
 
 
 def _number(value: float | Expr) -> str:

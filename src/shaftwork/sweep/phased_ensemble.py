@@ -1,0 +1,147 @@
+"""Many variants side by side of a network whose parts change their mode: the guards, and where they lead."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import cast
+
+import numpy as np
+
+from shaftwork.codegen.array_form.elements import Array
+from shaftwork.core.errors import CompileError
+from shaftwork.hybrid.hybrid_state import AHEAD, AHEAD_OF_RUN, CLEAR, EPS, GOLDEN, NOTHING, ROUNDINGS
+from shaftwork.hybrid.modes.exceeded_guards import FEW
+from shaftwork.hybrid.modes.mode_equations import ModeEquations
+from shaftwork.hybrid.modes.mode_machines import with_modes
+from shaftwork.hybrid.phased_model import PhasedModel
+from shaftwork.hybrid.phases import Phases
+from shaftwork.hybrid.starts import conditional
+from shaftwork.pipeline.arguments import NOMINAL
+from shaftwork.sweep.ensemble import Ensemble
+from shaftwork.sweep.ensemble_equations import EnsembleCode, EnsembleEquations, ModeNames, PhaseEntry, VariantGroup
+from shaftwork.sweep.lane_extremes import Mask
+
+CLOCKED = "A limit at which a mode ends changes with the time by itself, and a long step might pass over that."
+Course = tuple[Array, Array, Array, Array]
+"""Times (k,), states (n, k), their rates, and guards (guards, k)."""
+
+
+class PhasedEnsemble(Ensemble):
+    """Measures of many variants of a network whose parts change their mode; see `Ensemble`."""
+
+    @property
+    def _phases(self) -> Phases:
+        return cast("PhasedModel", self.model).phases
+
+    def _first_modes(self, values: Mapping[str, float]) -> ModeNames:
+        phases = self._phases
+        assembly = phases.assembly(phases.first)
+        p = assembly.vector(dict(values), phases.numbers(phases.first))
+        return assembly.first_modes(self.span[0], np.zeros(len(assembly.model.states)), p)
+
+    def _equations_in(self, modes: ModeNames) -> EnsembleEquations:
+        assembly = self._phases.assembly(modes)
+        if assembly.clocks:
+            raise CompileError(CLOCKED)
+        code = self.code_of(assembly.model, assembly.program, assembly.stores)
+        base = assembly.vector(self.first, self._phases.numbers(modes))
+        return GuardedEquations(code, assembly, modes, base, self.names, self.span)
+
+    @cached_property
+    def decisive(self) -> bool:
+        """Whether a parameter that varies decides in which mode a motion starts."""
+        symbols = {
+            f"{element.part.name}.{symbol.name}"
+            for element in self._phases.elements
+            for symbol in conditional(element.modes)
+        }
+        return not symbols.isdisjoint(self.names)
+
+    def after(self, group: VariantGroup, guard: int, p: Array) -> list[tuple[ModeNames, Mask]]:
+        """The modes to which a guard leads by itself, and the lanes (k,) that go there."""
+        assembly = self._phases.assembly(group.modes)
+        met = [active for active in assembly.watched(group.modes) if active.guard == guard]
+        if len(met) != 1 or met[0].leave.rebound is not None:
+            return []
+        ended, number, count = met[0], met[0].element, group.lanes.size
+        names = [ended.leave.to] * count
+        if not ended.leave.to:
+            before, parameters = group.modes[number], p[: len(assembly.model.parameters)]
+            starts = zip(group.t.tolist(), group.x.T, parameters.T, strict=True)
+            names = [assembly.start_of(number, before, *start) for start in starts]
+        targets = dict.fromkeys(names)
+        return [(with_modes(group.modes, {number: to}), np.array([name == to for name in names])) for to in targets]
+
+
+class GuardedEquations(EnsembleEquations):
+    """The equations of one combination of modes, with the guards that end these.
+
+    Args:
+        code: its programs.
+        assembly: the equations with their guards.
+        modes: the combination.
+        base: the parameter vector of a variant, of which sizes are taken.
+        names: of the parameters that vary.
+        span: start and end of the motion, s.
+    """
+
+    def __init__(
+        self,
+        code: EnsembleCode,
+        assembly: ModeEquations,
+        modes: ModeNames,
+        base: Array,
+        names: Sequence[str],
+        span: tuple[float, float],
+    ) -> None:
+        super().__init__(code, base, assembly.sizes(base), names)
+        self.sides = assembly.sides(modes)
+        self._tick = ROUNDINGS * float(np.spacing(max(map(abs, span))))
+        self._ahead = AHEAD_OF_RUN * (span[1] - span[0])
+
+    def entered(self, t: Array, x: Array, p: Array) -> PhaseEntry:
+        """Whether every guard is on its own side, or on its limit and about to be, as `EventIteration` would find.
+
+        Args:
+            t: (k,) s.
+            x: (n, k) states.
+            p: (parameters, k).
+        """
+        if not len(self.sides):
+            return super().entered(t, x, p)
+        rates, now = self.code.motion(t, x, p)
+        moved = self._rounded(x, rates)
+        near_rates, near = self.code.motion(t + self._tick, moved, p)
+        side, bands, step = self.sides[:, None], np.abs(near - now), self._step(rates)
+        value = side * now
+        falls, decided = np.zeros_like(value, dtype=bool), np.zeros_like(value, dtype=bool)
+        here, beside = (t, x, rates, now), (t + self._tick, moved, near_rates, near)
+        for _ in range(2):  # where nothing moves yet, its acceleration tells
+            here, beside = self._later(step, here, p), self._later(step, beside, p)
+            gain, other = side * (here[3] - now), side * (beside[3] - near)
+            sure = np.abs(gain) > np.maximum(np.abs(gain - other), FEW * bands / ROUNDINGS)
+            falls |= ~decided & sure & (gain < 0)
+            decided |= sure
+        good = (value < -bands) | ((value <= bands) & falls)
+        clear = np.where(2 * value > -CLEAR * bands, np.maximum(value, 0.0) + CLEAR * bands, bands)
+        return PhaseEntry(np.all(good[self.watched], axis=0), np.maximum(clear, NOTHING))
+
+    def _rounded(self, x: Array, rates: Array) -> Array:
+        """The states so far away as rounding may move them, and the time by a tick; see `Regime.moves`."""
+        signs = np.array([(-1.0) ** k for k in range(len(x))])[:, None]
+        part = signs * np.array([(0.5 + k * GOLDEN % 1) * ROUNDINGS * EPS for k in range(len(x))])[:, None]
+        least = part * self.sizes[:, None] / NOMINAL
+        return np.asarray(x + part * np.abs(x) + least + signs * self._tick * np.abs(rates))
+
+    def _step(self, rates: Array) -> Array:
+        """(k,) how far in s the further course is looked at."""
+        with np.errstate(divide="ignore"):
+            steps = (AHEAD * self.sizes[:, None] / np.abs(rates)).min(axis=0)
+        return np.asarray(np.minimum(self._ahead, steps))
+
+    def _later(self, step: Array, course: Course, p: Array) -> Course:
+        """A step further along a straight line."""
+        t, x, rates, _ = course
+        later = x + step * rates
+        return t + step, later, *self.code.motion(t + step, later, p)
