@@ -21,10 +21,10 @@ from shaftwork.codegen.times.timeline import Timeline
 from shaftwork.codegen.valueless import refuse_vanishing
 from shaftwork.core.errors import AccuracyWarning, NetworkError, ParameterError, SimulationError
 from shaftwork.core.notices import warn
+from shaftwork.hybrid.commutation import takeovers
 from shaftwork.hybrid.event_iteration import EventIteration
 from shaftwork.hybrid.hybrid_state import Change, HybridState, Regime, Transition
 from shaftwork.hybrid.in_place_events import InPlaceEvents, Phase
-from shaftwork.hybrid.modes.commutation import takeovers
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, with_modes
 from shaftwork.hybrid.phases import FOLLOWING, Phases
@@ -137,7 +137,7 @@ class HybridRun:
             except ParameterError as error:
                 failed = failed or error
             else:
-                stored = self.settling.stored(moment, start)
+                stored = moment.stored(start)
                 readings.append((sum(stored[name] != 0 for name in stored.keys() - initial.keys()), joins, moment))
         if readings:  # what is not named rests, if the circuit lets it
             _, joins, moment = min(readings, key=itemgetter(0))
@@ -145,7 +145,7 @@ class HybridRun:
         for joins in takeovers(self.phases.elements, with_modes(self.phases.first, closed)):
             with suppress(ParameterError, SimulationError, NetworkError):
                 transition = self._joined(closed | joins, self._read(initial, closed | joins))
-                stored = self.settling.stored(transition[0], start)
+                stored = transition[0].stored(start)
                 if all(abs(stored.get(k, v) - v) <= NO_IMPACT * max(abs(v), 1.0) for k, v in initial.items()):
                     return transition
         assert failed is not None  # noqa: S101 (as no reading is left)
@@ -157,7 +157,7 @@ class HybridRun:
         if not switches:
             return {}
         regime = self.settling.regime(self.phases.first)
-        rest = np.zeros(len(regime.assembly.model.states))
+        rest = np.zeros(len(regime.model.states))
         modes = regime.assembly.first_modes(self._after(regime), rest, regime.p)
         joins = {k: modes[k] for k in switches if modes[k] != self.phases.first[k]}
         return joins if self.settling.possible(with_modes(self.phases.first, joins)) else {}
@@ -182,18 +182,18 @@ class HybridRun:
 
     def _beside_waves(self, regime: Regime, x: Array, start: WaveStart | CarriedWaves | None) -> Array:
         """The states at the start, and behind them what arrives by waves, if there are any."""
-        if not regime.assembly.model.form.waves:
+        if not regime.form.waves:
             return x
-        self.waves = WaveRun(regime.assembly.bound(regime.p), start, self.demand.span)
+        self.waves = WaveRun(regime.bound, start, self.demand.span)
         return np.concatenate([x, self.waves.arriving(self.demand.span[0])])
 
     def _resumed(self, ending: Ending) -> Transition:
         """The states and modes in which another motion ended, and what changes at that instant."""
         start, first = self.demand.span[0], self.settling.regime(self.phases.first)
-        x = self._beside_waves(first, np.zeros(len(first.assembly.model.states)), ending.waves)
+        x = self._beside_waves(first, np.zeros(len(first.model.states)), ending.waves)
         moment, changes = self.settling.resumed(ending.beside(first.assembly.arriving(x))), list[Change]()
         after = self._instants(moment).sides(start)[1]
-        if after != ending.read and moment.regime.assembly.model.form.has_impulses:
+        if after != ending.read and moment.regime.form.has_impulses:
             moment, changes, _ = self.settling.jumped(start, moment, ending.read, after)
         moment, further = self.settling.settle(start, after, moment, None)
         return moment, [*changes, *further]
@@ -258,7 +258,7 @@ class HybridRun:
         following = bisect_right(times.stops, t)
         end = min([*times.stops[following : following + 1], demand.span[1]])
         problem = moment.problem((t, end), times)
-        states = regime.assembly.model.states
+        states = regime.model.states
         atol = demand.rtol * problem.atol
         atol[: len(states)] = demand.tolerances(problem.atol[: len(states)], states)
         return changed(
@@ -275,7 +275,7 @@ class HybridRun:
 
     def _span(self, t: float, moment: HybridState) -> tuple[float, HybridState]:
         """One run of the engine, up to a change of equations or the next instant at which an input jumps."""
-        regime, form = moment.regime, moment.regime.assembly.model.form
+        regime, form = moment.regime, moment.regime.form
         bind = partial(regime.assembly.bound, regime.p)
         refuse_vanishing(form, bind, lambda: np.array([t]), lambda _: moment.x[None])
         trajectory, passing = self._passed(t, moment)
@@ -294,7 +294,7 @@ class HybridRun:
             self.note(t, changes)
             return t, moment
         moment = HybridState(passing.regime, x[: moment.x.size], passing.bands)
-        if sides != (t, t) and moment.regime.assembly.model.form.has_impulses:
+        if sides != (t, t) and moment.regime.form.has_impulses:
             moment, changes, at_once = self.settling.jumped(t, moment, *sides)
             self.note(t, changes)
             self.jumps.append(at_once)
@@ -314,7 +314,7 @@ class HybridRun:
         passing = InPlaceEvents(self.settling, moment, t, self.note, self._suits_heyoka)
         problem, noted, soon = self._problem(t, moment, passing), len(self.changes), [*self._soon]
         if not problem.x0.size:
-            still = at_rest(problem, moment.regime.assembly.model.degree)
+            still = at_rest(problem, moment.regime.model.degree)
             return replace(still, end=(problem.t_end, problem.x0)), passing
         name, why = self._engine(moment, lambda: problem)
         if self.waves is not None:

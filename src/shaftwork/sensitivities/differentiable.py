@@ -146,7 +146,5 @@ def _start(
     """The states by name, and where they start, in the equations in which nothing is joined."""
     if not isinstance(model, PhasedModel):
         return tuple(model.states), start_of(model, model.prepare(model.vector(values)), initial, span)[0]
-    phases = model.phases
-    assembly = phases.assembly(phases.first)
-    p = assembly.vector(values, phases.numbers(phases.first))
+    assembly, p = model.phases.first_equations(values)
     return tuple(assembly.model.states), start_of(assembly.model, assembly.prepared(p), initial, span)[0]

@@ -124,9 +124,7 @@ class Ensemble:
         """The modes in which a variant starts."""
         if self.phased is None:
             return ()
-        phases = self.phased.phases
-        assembly = phases.assembly(phases.first)
-        p = assembly.vector(dict(values), phases.numbers(phases.first))
+        assembly, p = self.phased.phases.first_equations(values)
         return assembly.first_modes(self.span[0], np.zeros(len(assembly.model.states)), p)
 
     def starts_alike(self, column: Array) -> bool:

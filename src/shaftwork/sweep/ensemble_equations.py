@@ -13,8 +13,7 @@ from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.core.errors import CompileError
 from shaftwork.formulation.observables import Observables
-from shaftwork.hybrid.hybrid_state import AHEAD, AHEAD_OF_RUN, CLEAR, EPS, GOLDEN, NOTHING, ROUNDINGS
-from shaftwork.hybrid.modes.exceeded_guards import FEW
+from shaftwork.hybrid.hybrid_state import AHEAD, AHEAD_OF_RUN, CLEAR, EPS, FEW, GOLDEN, NOTHING, ROUNDINGS
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import ModeNames
 from shaftwork.pipeline.arguments import NOMINAL
