@@ -100,7 +100,7 @@ class HybridRun:
         self._soon = [0] * len(CHATTER)
 
     def march(self, initial: Mapping[str, float] | None) -> None:
-        """Go through all phases from the start values."""
+        """Go through all phases from the start values, from one change of equations to the next."""
         t, end = self.demand.span
         moment = self.begin(initial)
         while t < end:
@@ -223,12 +223,6 @@ class HybridRun:
     def _instants(self, moment: HybridState) -> Timeline:
         return self.timeline(moment.regime.assembly, moment.regime.p)
 
-    def _settle(self, t: float, moment: HybridState, met: int | None) -> HybridState:
-        after = self._instants(moment).sides(t)[1]
-        moment, changes = self.settling.settle(t, after, moment, met)
-        self.note(t, changes)
-        return moment
-
     def note(self, t: float, changes: list[Change]) -> None:
         """Put down what has changed at a time.
 
@@ -274,11 +268,11 @@ class HybridRun:
         )
 
     def _span(self, t: float, moment: HybridState) -> tuple[float, HybridState]:
-        """One run of the engine, up to a change of equations or the next instant at which an input jumps."""
+        """One run of the engine, up to other equations or an instant at which an input jumps; what goes on then."""
         regime, form = moment.regime, moment.regime.form
         bind = partial(regime.assembly.bound, regime.p)
         refuse_vanishing(form, bind, lambda: np.array([t]), lambda _: moment.x[None])
-        trajectory, passing = self._passed(t, moment)
+        trajectory, passing = self._followed(t, moment)
         passing.close()
         refuse_vanishing(form, bind, lambda: trajectory.dense.steps, trajectory.dense)
         self.steps += trajectory.statistics.get("steps", 0)
@@ -288,19 +282,27 @@ class HybridRun:
             # an output at an event belongs to the next phase, which has it too
             trajectory = replace(trajectory, t=trajectory.t[:-1], x=trajectory.x[:-1])
         self.spans.append(Span(trajectory, tuple(passing.phases)))
-        met, sides = trajectory.met, self._instants(moment).sides(t)
+        return t, self._settled(t, x[: moment.x.size], passing, trajectory.met)
+
+    def _settled(self, t: float, x: Array, passing: InPlaceEvents, met: int | None) -> HybridState:
+        """What goes on at the end of a run of the engine, from its states (n,) and the guard that is met, or None."""
+        moment = HybridState(passing.regime, x, passing.bands)
+        sides = self._instants(moment).sides(t)
         if met is not None and passing.beyond is not None and sides == (t, t):
             moment, changes = passing.beyond
             self.note(t, changes)
-            return t, moment
-        moment = HybridState(passing.regime, x[: moment.x.size], passing.bands)
+            return moment
         if sides != (t, t) and moment.regime.form.has_impulses:
             moment, changes, at_once = self.settling.jumped(t, moment, *sides)
             self.note(t, changes)
             self.jumps.append(at_once)
             met = None if changes else met
-        over = met is None and t >= self.demand.span[1]
-        return t, moment if over else self._settle(t, moment, met)
+        if met is None and t >= self.demand.span[1]:
+            return moment
+        after = self._instants(moment).sides(t)[1]  # those of other equations, where a jump has led there
+        moment, changes = self.settling.settle(t, after, moment, met)
+        self.note(t, changes)
+        return moment
 
     def _outputs(self, t: float, end: float) -> Array | None:
         """The output times of a phase: an event belongs to the next one."""
@@ -309,7 +311,7 @@ class HybridRun:
         first, last = self.demand.t_eval.searchsorted((t, end))
         return self.demand.t_eval[first : last + (end == self.demand.span[1])]
 
-    def _passed(self, t: float, moment: HybridState) -> tuple[Trajectory, InPlaceEvents]:
+    def _followed(self, t: float, moment: HybridState) -> tuple[Trajectory, InPlaceEvents]:
         """One run of the engine; where heyoka cannot go on, or a stiff phase is long, another engine begins it anew."""
         passing = InPlaceEvents(self.settling, moment, t, self.note, self._suits_heyoka)
         problem, noted, soon = self._problem(t, moment, passing), len(self.changes), [*self._soon]
@@ -337,7 +339,7 @@ class HybridRun:
                     raise
                 if isinstance(error, StickingError) and error.driven_back:
                     raise
-            if engine == "heyoka" and not stiff:
+            if engine == "heyoka" and not stiff:  # only then: whether an engine is installed takes a while to tell
                 *others, (last, _) = choice.without_series(most)
                 tried += others
             del self.changes[noted:]
