@@ -10,20 +10,24 @@ from types import MappingProxyType
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import NetworkError, SimulationError
-from shaftwork.hybrid.hybrid_state import Change, HybridState, Transition, together
+from shaftwork.hybrid.commutation import Commutation
+from shaftwork.hybrid.hybrid_state import (
+    Change,
+    HybridState,
+    Transition,
+    differences,
+    exceeded,
+    passes_limit,
+    resting,
+)
 from shaftwork.hybrid.impacts.impacts import Impacts
-from shaftwork.hybrid.modes.commutation import Commutation
-from shaftwork.hybrid.modes.exceeded_guards import exceeded, passes_limit, resting
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import ActiveGuard, ModeNames, limited, with_modes
-from shaftwork.hybrid.phases import Phases
-from shaftwork.hybrid.regimes import Regimes, anew, refuse_beyond
+from shaftwork.hybrid.phases import Phases, Regimes, anew, refuse_beyond
 
 MOST_AT_ONCE = 2000
 """So many changes within one instant have no end: of two rigid flanks without a gap between them, say."""
 MOST_REPEATS = 2
-NEAR = 64
-"""A guard that is farther from its limit than this many times what it is met by is not met now."""
 
 
 class EventIteration:
@@ -45,7 +49,7 @@ class EventIteration:
     ) -> None:
         self.elements = phases.elements
         self._regimes = Regimes(phases, values, span, equations or phases.assembly)
-        self.regime, self.stored, self.resumed = self._regimes.regime, self._regimes.stored, self._regimes.resumed
+        self.regime, self.resumed = self._regimes.regime, self._regimes.resumed
         self._impacts = Impacts(self._regimes, together=phases.netlist.impacts == "together")
         self._commutation = Commutation(self._regimes)
         self.jumped, self.possible = self._impacts.jumped, self._regimes.possible
@@ -78,6 +82,10 @@ class EventIteration:
             modes = next(filter(self.possible, options), modes)
         return self._regimes.changed(loose, t, modes)
 
+    def begun(self, t: float, x: Array) -> HybridState:
+        """The modes that go on where a motion starts at a time in s with states (n,), as in `started`."""
+        return self.settle(t, t, self.started(t, x), None)[0]
+
     def settle(self, t: float, after: float, moment: HybridState, met: int | None) -> Transition:
         """The modes that go on, and the changes that lead there.
 
@@ -93,35 +101,17 @@ class EventIteration:
         ends = met is not None or passes_limit(moment._replace(bands=()), after)
         joins = resting(moment, after) if ends else {}
         if not joins:
-            return self._settled(t, after, moment, met)
+            return self._fewest(t, after, moment, met)
         # Who carries is told anew. A law that falls at once would tell a way in which nothing moves: of two frictions
         # one has given way at rest, and now the other one does, backward. Once it moves, the first one has less torque
         # than it holds at rest, and would move forward instead, which the other one does not let it.
         joined, begun = self._joined(t, after, moment, joins)
-        new, changes = self._settled(t, after, joined, None)
+        new, changes = self._consistent(t, after, joined, None)
         if new.regime.modes == moment.regime.modes:  # rounding hides what was met
             ended = [(active.element, active.leave) for active in moment.regime.watched if active.guard == met]
             same = (active.guard for active in joined.regime.watched if (active.element, active.leave) in ended)
-            new, changes = self._settled(t, after, joined, next(same, None))
-        return new, together([*begun, *changes])
-
-    def _settled(self, t: float, after: float, moment: HybridState, met: int | None) -> Transition:
-        """The same where nothing rests by now; what does so then is joined, in the order of the network."""
-        new, changes = self._fewest(t, after, moment, met)
-        joins = resting(new, after) if changes else {}
-        if not joins:
-            return new, changes
-        try:  # joined all at once: what was slipping a change ago must not tell who carries
-            joined, at_once = self._joined(t, after, new, joins)
-            settled, further = self._consistent(t, after, joined, None)
-        except (NetworkError, SimulationError):
-            return new, changes
-        # back where it came from: a limit has just been exceeded there
-        if settled.regime.modes == moment.regime.modes or any(one.impact for one in further):
-            return new, changes
-        if settled.regime.modes == new.regime.modes:
-            return new, together(changes) or changes
-        return settled, together([*changes, *at_once, *further])
+            new, changes = self._fewest(t, after, joined, next(same, None))
+        return new, _together([*begun, *changes])
 
     def _joined(self, t: float, after: float, moment: HybridState, joins: Mapping[int, str]) -> Transition:
         """The same instant with elements in modes in which they hold, and the changes to these."""
@@ -158,10 +148,6 @@ class EventIteration:
 
     def _at_once(self, moment: HybridState, t: float, named: ActiveGuard) -> list[ActiveGuard]:
         """The guards that are met at the instant at which one is, in the order of their elements."""
-        regime, others = moment.regime, [active for active in moment.regime.watched if active is not named]
-        now, bands = regime.limits(t, moment.x.tolist()), moment.bands
-        if bands and all(active.side * now[active.guard] < -NEAR * bands[active.guard] for active in others):
-            return [named]
         met = [active for _, active in exceeded(moment, t, moment, in_order=True)[1]]
         if named not in met and (not named.leave.by_torque or all(active.leave.by_torque for active in met)):
             met.append(named)
@@ -266,8 +252,7 @@ class EventIteration:
                 new = self._impacts.jammed(after, moment, self._regimes.changed(moment, after, combination))
             except NetworkError:  # what slips behind the gear lets another one jam
                 continue
-            pairs = zip(self.elements, modes, new.regime.modes, strict=True)
-            return new, [Change(t, *names) for names in pairs if names[1] != names[2]]
+            return new, differences(t, self.elements, modes, new.regime.modes)
         raise SimulationError(
             f"'{element.name}' can neither stay {element.modes[before].words} nor become {element.modes[to].words} "
             f"at t = {t:.9g} s. {error.problems[0]}"
@@ -278,14 +263,14 @@ class EventIteration:
         modes, options = moment.regime.modes, self.elements[number].modes
         if moment.across(number, t) != 0:
             return None
-        stored = self.stored(moment, t)
+        stored = moment.stored(t)
         leads = [leave.to for name in (to, modes[number]) for leave in options[name].leaves]
         for name in dict.fromkeys(leads):
             combination = with_modes(modes, {number: name})
             if name in (to, modes[number]) or not self.possible(combination):
                 continue
             new = self._regimes.changed(moment, t, combination)
-            if self.stored(new, t) == stored and not exceeded(new, t, new)[1]:
+            if new.stored(t) == stored and not exceeded(new, t, new)[1]:
                 return new, name
         return None
 
@@ -324,3 +309,14 @@ def _endless(t: float, changes: list[Change], blocked: NetworkError | None) -> S
         f"At t = {t:.9g} s no modes of {', '.join(others)} are consistent: '{last.element.name}' changes for ever "
         f"between {before} and {after}. {advice}"
     )
+
+
+def _together(changes: list[Change]) -> list[Change]:
+    """Changes of one instant, with those of each element in one; but an impact stays apart."""
+    if any(change.impact for change in changes):
+        return changes
+    by_element: dict[int, Change] = {}
+    for change in changes:
+        earlier = by_element.get(id(change.element), change)
+        by_element[id(change.element)] = change._replace(before=earlier.before)
+    return [change for change in by_element.values() if change.before != change.after]

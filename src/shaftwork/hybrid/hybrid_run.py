@@ -22,10 +22,10 @@ from shaftwork.codegen.times.timeline import Timeline
 from shaftwork.codegen.valueless import refuse_vanishing
 from shaftwork.core.errors import AccuracyWarning, NetworkError, ParameterError, SimulationError
 from shaftwork.core.notices import warn
+from shaftwork.hybrid.commutation import takeovers
 from shaftwork.hybrid.event_iteration import EventIteration
 from shaftwork.hybrid.hybrid_state import Change, HybridState, Regime, Transition
 from shaftwork.hybrid.in_place_events import InPlaceEvents, Phase
-from shaftwork.hybrid.modes.commutation import takeovers
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, with_modes
 from shaftwork.hybrid.phases import FOLLOWING, Phases
@@ -102,7 +102,7 @@ class HybridRun:
         self._soon = [0] * len(CHATTER)
 
     def march(self, initial: Mapping[str, float] | None) -> None:
-        """Go through all phases from the start values."""
+        """Go through all phases from the start values, from one change of equations to the next."""
         t, end = self.demand.span
         moment = self.begin(initial)
         while t < end:
@@ -139,7 +139,7 @@ class HybridRun:
             except ParameterError as error:
                 failed = failed or error
             else:
-                stored = self.settling.stored(moment, start)
+                stored = moment.stored(start)
                 readings.append((sum(stored[name] != 0 for name in stored.keys() - initial.keys()), joins, moment))
         if readings:  # what is not named rests, if the circuit lets it
             _, joins, moment = min(readings, key=itemgetter(0))
@@ -147,7 +147,7 @@ class HybridRun:
         for joins in takeovers(self.phases.elements, with_modes(self.phases.first, closed)):
             with suppress(ParameterError, SimulationError, NetworkError):
                 transition = self._joined(closed | joins, self._read(initial, closed | joins))
-                stored = self.settling.stored(transition[0], start)
+                stored = transition[0].stored(start)
                 if all(abs(stored.get(k, v) - v) <= NO_IMPACT * max(abs(v), 1.0) for k, v in initial.items()):
                     return transition
         assert failed is not None  # noqa: S101 (as no reading is left)
@@ -159,7 +159,7 @@ class HybridRun:
         if not switches:
             return {}
         regime = self.settling.regime(self.phases.first)
-        rest = np.zeros(len(regime.assembly.model.states))
+        rest = np.zeros(len(regime.model.states))
         modes = regime.assembly.first_modes(self._after(regime), rest, regime.p)
         joins = {k: modes[k] for k in switches if modes[k] != self.phases.first[k]}
         return joins if self.settling.possible(with_modes(self.phases.first, joins)) else {}
@@ -184,20 +184,20 @@ class HybridRun:
 
     def _beside_waves(self, regime: Regime, x: Array, start: Any) -> Array:
         """The states at the start, and behind them what arrives by waves, if there are any."""
-        if not regime.assembly.model.form.waves:
+        if not regime.form.waves:
             return x
         from shaftwork.waves.hybrid_waves import WaveRun
 
-        self.waves = WaveRun(regime.assembly.bound(regime.p), start, self.demand.span)
+        self.waves = WaveRun(regime.bound, start, self.demand.span)
         return np.concatenate([x, self.waves.arriving(self.demand.span[0])])
 
     def _resumed(self, ending: Ending) -> Transition:
         """The states and modes in which another motion ended, and what changes at that instant."""
         start, first = self.demand.span[0], self.settling.regime(self.phases.first)
-        x = self._beside_waves(first, np.zeros(len(first.assembly.model.states)), ending.waves)
+        x = self._beside_waves(first, np.zeros(len(first.model.states)), ending.waves)
         moment, changes = self.settling.resumed(ending.beside(first.assembly.arriving(x))), list[Change]()
         after = self._instants(moment).sides(start)[1]
-        if after != ending.read and moment.regime.assembly.model.form.has_impulses:
+        if after != ending.read and moment.regime.form.has_impulses:
             moment, changes, _ = self.settling.jumped(start, moment, ending.read, after)
         moment, further = self.settling.settle(start, after, moment, None)
         return moment, [*changes, *further]
@@ -226,12 +226,6 @@ class HybridRun:
 
     def _instants(self, moment: HybridState) -> Timeline:
         return self.timeline(moment.regime.assembly, moment.regime.p)
-
-    def _settle(self, t: float, moment: HybridState, met: int | None) -> HybridState:
-        after = self._instants(moment).sides(t)[1]
-        moment, changes = self.settling.settle(t, after, moment, met)
-        self.note(t, changes)
-        return moment
 
     def note(self, t: float, changes: list[Change]) -> None:
         """Put down what has changed at a time.
@@ -262,7 +256,7 @@ class HybridRun:
         following = bisect_right(times.stops, t)
         end = min([*times.stops[following : following + 1], demand.span[1]])
         problem = moment.problem((t, end), times)
-        states = regime.assembly.model.states
+        states = regime.model.states
         atol = demand.rtol * problem.atol
         atol[: len(states)] = demand.tolerances(problem.atol[: len(states)], states)
         return changed(
@@ -278,11 +272,11 @@ class HybridRun:
         )
 
     def _span(self, t: float, moment: HybridState) -> tuple[float, HybridState]:
-        """One run of the engine, up to a change of equations or the next instant at which an input jumps."""
-        regime, form = moment.regime, moment.regime.assembly.model.form
+        """One run of the engine, up to other equations or an instant at which an input jumps; what goes on then."""
+        regime, form = moment.regime, moment.regime.form
         bind = partial(regime.assembly.bound, regime.p)
         refuse_vanishing(form, bind, lambda: np.array([t]), lambda _: moment.x[None])
-        trajectory, passing = self._passed(t, moment)
+        trajectory, passing = self._followed(t, moment)
         passing.close()
         refuse_vanishing(form, bind, lambda: trajectory.dense.steps, trajectory.dense)
         self.steps += trajectory.statistics.get("steps", 0)
@@ -292,19 +286,27 @@ class HybridRun:
             # an output at an event belongs to the next phase, which has it too
             trajectory = replace(trajectory, t=trajectory.t[:-1], x=trajectory.x[:-1])
         self.spans.append(Span(trajectory, tuple(passing.phases)))
-        met, sides = trajectory.met, self._instants(moment).sides(t)
+        return t, self._settled(t, x[: moment.x.size], passing, trajectory.met)
+
+    def _settled(self, t: float, x: Array, passing: InPlaceEvents, met: int | None) -> HybridState:
+        """What goes on at the end of a run of the engine, from its states (n,) and the guard that is met, or None."""
+        moment = HybridState(passing.regime, x, passing.bands)
+        sides = self._instants(moment).sides(t)
         if met is not None and passing.beyond is not None and sides == (t, t):
             moment, changes = passing.beyond
             self.note(t, changes)
-            return t, moment
-        moment = HybridState(passing.regime, x[: moment.x.size], passing.bands)
-        if sides != (t, t) and moment.regime.assembly.model.form.has_impulses:
+            return moment
+        if sides != (t, t) and moment.regime.form.has_impulses:
             moment, changes, at_once = self.settling.jumped(t, moment, *sides)
             self.note(t, changes)
             self.jumps.append(at_once)
             met = None if changes else met
-        over = met is None and t >= self.demand.span[1]
-        return t, moment if over else self._settle(t, moment, met)
+        if met is None and t >= self.demand.span[1]:
+            return moment
+        after = self._instants(moment).sides(t)[1]  # those of other equations, where a jump has led there
+        moment, changes = self.settling.settle(t, after, moment, met)
+        self.note(t, changes)
+        return moment
 
     def _outputs(self, t: float, end: float) -> Array | None:
         """The output times of a phase: an event belongs to the next one."""
@@ -313,12 +315,12 @@ class HybridRun:
         first, last = self.demand.t_eval.searchsorted((t, end))
         return self.demand.t_eval[first : last + (end == self.demand.span[1])]
 
-    def _passed(self, t: float, moment: HybridState) -> tuple[Trajectory, InPlaceEvents]:
+    def _followed(self, t: float, moment: HybridState) -> tuple[Trajectory, InPlaceEvents]:
         """One run of the engine; where heyoka cannot go on, or a stiff phase is long, another engine begins it anew."""
         passing = InPlaceEvents(self.settling, moment, t, self.note, self._suits_heyoka)
         problem, noted, soon = self._problem(t, moment, passing), len(self.changes), [*self._soon]
         if not problem.x0.size:
-            still = at_rest(problem, moment.regime.assembly.model.degree)
+            still = at_rest(problem, moment.regime.model.degree)
             return replace(still, end=(problem.t_end, problem.x0)), passing
         name, why = self._engine(moment, lambda: problem)
         if self.waves is not None:
@@ -341,7 +343,7 @@ class HybridRun:
                     raise
                 if isinstance(error, StickingError) and error.driven_back:
                     raise
-            if engine == "heyoka" and not stiff:
+            if engine == "heyoka" and not stiff:  # only then: whether an engine is installed takes a while to tell
                 *others, (last, _) = choice.without_series(most)
                 tried += others
             del self.changes[noted:]

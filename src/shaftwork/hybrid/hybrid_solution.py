@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from functools import cache, cached_property, partial
+from dataclasses import dataclass
+from functools import cache, cached_property
 from itertools import chain, groupby
 from operator import attrgetter
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shaftwork.codegen.array_form.elements import Array
+from shaftwork.codegen.array_form.elements import Array, Index
 from shaftwork.codegen.model_observer import Impact, ModelObserver
+from shaftwork.codegen.times.timeline import Timeline
+from shaftwork.codegen.waves import DenseWaves
+from shaftwork.components.base import Component
 from shaftwork.hybrid.hybrid_run import HybridRun, Span
-from shaftwork.hybrid.hybrid_state import Change, without_detours
+from shaftwork.hybrid.hybrid_state import Change, Regime
 from shaftwork.hybrid.impacts.impulses import summed
-from shaftwork.hybrid.in_place_events import Phase
-from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import ModeMachine, ModeNames
-from shaftwork.hybrid.phase_observer import PhaseObserver, Stretch, Stretches
 from shaftwork.results.observer import PhaseRow
 from shaftwork.results.solution import Solution
 
@@ -28,77 +29,110 @@ if TYPE_CHECKING:
 
 def solution(run: HybridRun, name: str) -> Solution:
     """The motion as a whole, to be read."""
-    names = run.spans[0].phases[0].assembly.stores.names
-    whole = _Whole(run) if run.waves is None else _WithWaves(run, run.waves)
+    whole = Stretches(run) if run.waves is None else _WithWaves(run, run.waves)
     return Solution(
         name=name,
         t=np.concatenate([span.trajectory.t for span in run.spans]),
-        x=np.concatenate([_stored(run, span, names) for span in run.spans]),
-        states=names,
+        x=np.concatenate([*_outputs(run, whole)]),
+        states=whole.names,
         engine=run.engine,
         why=run.why,
         statistics={"steps": run.steps, "changes": len(run.changes)},
         dense=whole,
-        observer=PhaseObserver(names, lambda: whole.stretches, lambda: _impacts(run)),
+        observer=PhaseObserver(run, whole),
         events=tuple(_events(run.changes)),
         phases=_table(run),
     )
 
 
-def _stored(run: HybridRun, span: Span, names: tuple[str, ...]) -> Array:
-    """(k, stores) all that is stored at the output times of a span, and what arrives by waves."""
-    assembly = span.phases[0].assembly
-    t, states = span.trajectory.t, span.trajectory.x[:, : _width(assembly)]
-    arrived = states[:, len(assembly.model.states) :]
-    if not t.size:
-        return np.empty((0, len(names) + arrived.shape[1]))
-    return np.hstack([_stores(run, span, names, states), arrived])
+@dataclass(eq=False)
+class Stretch:
+    """A phase as it is read.
 
+    Args:
+        regime: its modes and equations.
+        instants: at which inputs jump.
+        span: the run of an engine in which it is.
+    """
 
-def _stores(run: HybridRun, span: Span, names: tuple[str, ...], states: Array) -> Array:
-    t, first = span.trajectory.t, span.phases[0]
-    stores = first.assembly.stores
-    if stores.by_loops:
-        return stores.of(lambda: first.assembly.bound(first.p), t, states)
-    starts = np.array([phase.start for phase in span.phases])
-    read_at = run.timeline(first.assembly, first.p).one_sided(t)
-    stored = np.empty((t.size, len(names)))
-    index = np.clip(np.searchsorted(starts, t, side="right") - 1, 0, None)
-    for number in np.unique(index).tolist():
-        here = index == number
-        phase = span.phases[number]
-        stored[here] = stores.of(partial(phase.assembly.bound, phase.p), read_at[here], states[here])
-    return stored
-
-
-def _width(assembly: ModeEquations) -> int:
-    """The number of states, and of what arrives by waves behind them."""
-    return len(assembly.model.states) + len(assembly.model.form.waves)
-
-
-class _Whole:
-    """All that is stored at any time of a motion; what it needs is made when it is first asked."""
-
-    def __init__(self, run: HybridRun) -> None:
-        self._run = run
+    regime: Regime
+    instants: Timeline
+    span: Span
 
     @cached_property
-    def stretches(self) -> Stretches:
-        """The phases as they are read."""
-        run = self._run
-        pairs = [(span, phase) for span in run.spans for phase in span.phases]
-        return Stretches([phase.start for _, phase in pairs], lambda number: _stretch(run, *pairs[number]))
+    def observer(self) -> ModelObserver:
+        """Of the equations."""
+        regime = self.regime
+        return ModelObserver(regime.form, lambda: regime.bound, self.instants, regime.assembly.quantities)
+
+    def stored(self, t: Array, x: Array) -> Array:
+        """(k, stores) all that is stored at times (k,) with states (k, n), and behind it what arrives by waves.
+
+        Behind the states there may be clocks, which are left out.
+        """
+        regime, states = self.regime, len(self.regime.model.states)
+        waves = x[:, states : states + len(regime.form.waves)]
+        x = x[:, : states + waves.shape[1]]
+        stored = regime.stores.of(lambda: regime.bound, self.instants.one_sided(t), x)
+        return np.hstack([stored, waves]) if waves.size else stored
+
+
+class Stretches:
+    """All phases of a motion, by time, and all that is stored at any time; each is made when it is first read.
+
+    Args:
+        run: the motion.
+    """
+
+    def __init__(self, run: HybridRun) -> None:
+        self._run, self._stretches = run, dict[int, Stretch]()
+        self._pairs = [(span, phase) for span in run.spans for phase in span.phases]
+        self._starts = np.array([phase.start for _, phase in self._pairs])
+        self.names = self._pairs[0][1].regime.stores.names
+        """Of all that is stored."""
+
+    def __getitem__(self, number: int) -> Stretch:
+        if number not in self._stretches:
+            span, (_, regime) = self._pairs[number]
+            instants = self._run.timeline(regime.assembly, regime.p)
+            self._stretches[number] = Stretch(regime, instants, span)
+        return self._stretches[number]
 
     @property
     def steps(self) -> Array:
         """Ends of the integration steps."""
         return np.unique(np.concatenate([span.trajectory.steps for span in self._run.spans]))
 
+    def numbers(self, t: Array) -> Index:
+        """The numbers of the phases at times (k,), of a time between two that of the later one."""
+        numbers: Index = np.clip(np.searchsorted(self._starts, t, side="right") - 1, 0, None)
+        return numbers
+
+    def groups(self, t: Array) -> Iterator[tuple[Stretch, Index]]:
+        """Of phases in equal modes the first, and the places of the times (k,) in all of them.
+
+        A time between two phases belongs to the later one; of one that is listed twice in a row the first does not.
+        """
+        numbers = self.numbers(t)
+        numbers = numbers - (np.append(t[1:] == t[:-1], False) & (self._starts[numbers] == t) & (numbers > 0))
+        alike: dict[Regime, list[int]] = {}
+        for number in np.unique(numbers).tolist():
+            alike.setdefault(self._pairs[number][1].regime, []).append(number)
+        for group in alike.values():
+            yield self[group[0]], np.flatnonzero(np.isin(numbers, group))
+
     def __call__(self, times: Array) -> Array:
-        return self.stretches.dense(times)
+        """(k, stores) all that is stored at times (k,), and behind it what arrives by waves."""
+        t = np.atleast_1d(np.asarray(times, dtype=float))
+        stored = np.empty((t.size, len(self.names) + len(self[0].regime.form.waves)))
+        numbers = self.numbers(t)
+        for number in np.unique(numbers).tolist():
+            places = np.flatnonzero(numbers == number)
+            stored[places] = self[number].stored(t[places], self[number].span.trajectory.dense(t[places]))
+        return stored
 
 
-class _WithWaves(_Whole):
+class _WithWaves(Stretches):
     """The same beside travelling waves, which are a motion between the phases too.
 
     Args:
@@ -111,23 +145,127 @@ class _WithWaves(_Whole):
         self.held, self.leaving, self.carried = waves.held, waves.leaving, waves.carried
 
 
-def _stretch(run: HybridRun, span: Span, phase: Phase) -> Stretch:
-    assembly, states = phase.assembly, phase.assembly.model.states
-    size, dense = _width(assembly), span.trajectory.dense
-    instants = run.timeline(assembly, phase.p)
-    bind = partial(assembly.bound, phase.p)
-    return Stretch(
-        start=phase.start,
-        key=(id(assembly), phase.p.tobytes()),
-        stores=assembly.stores,
-        bind=bind,
-        observer=ModelObserver(assembly.model.form, bind, instants, assembly.quantities),
-        instants=instants,
-        dense=lambda times: dense(times)[:, :size],
-        states=states,
-        ends=len(assembly.model.form.waves),
-        modes=dict(zip((element.name for element in run.phases.elements), phase.modes, strict=True)),
-    )
+def _outputs(run: HybridRun, stretches: Stretches) -> Iterator[Array]:
+    """(k, stores) of each span: all that is stored at its output times, and what arrives by waves."""
+    first = 0
+    for span in run.spans:
+        t, x, phases = span.trajectory.t, span.trajectory.x, len(span.phases)
+        numbers = np.clip(stretches.numbers(t), first, first + phases - 1)
+        if span.phases[0].regime.stores.by_loops:  # then they follow alike in all of its phases
+            numbers[:] = first
+        stored = [stretches[k].stored(t[numbers == k], x[numbers == k]) for k in np.unique(numbers).tolist()]
+        first += phases
+        yield from stored  # times do not fall, and so numbers do not
+
+
+class PhaseObserver:
+    """Recovers every quantity from all that is stored, in each phase by its own equations.
+
+    Args:
+        run: the motion.
+        stretches: its phases.
+    """
+
+    def __init__(self, run: HybridRun, stretches: Stretches) -> None:
+        self._run, self._stretches, self._names = run, stretches, stretches.names
+
+    def impacts(self, _dense: DenseWaves) -> tuple[Impact, ...]:
+        """Instants at which energy may be given or lost at once."""
+        return _impacts(self._run)
+
+    @property
+    def _first(self) -> ModelObserver:
+        return self._stretches[0].observer
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Every quantity that can be read and its unit."""
+        return self._first.units
+
+    @property
+    def wiring(self) -> Mapping[str, str]:
+        """By part, what it is, where it is, and what is no number of it."""
+        return self._first.wiring
+
+    def nodes_of(self, name: str) -> tuple[str, ...]:
+        """The moving nodes that a torque or speed is of, by its name in `units`; none for other quantities."""
+        return self._first.nodes_of(name)
+
+    @property
+    def profiles(self) -> Mapping[str, tuple[str, tuple[float, ...]]]:
+        """Every quantity that can be read along a part."""
+        return self._first.profiles
+
+    def signal(self, name: str, t: Array, x: Array, dense: DenseWaves | None = None) -> Array:
+        """(k,) a quantity by its name in `units`."""
+        values = np.empty(len(t))
+        for observer, places, times, states in self._pieces(t, x):
+            values[places] = observer.signal(name, times, states, dense)
+        return values
+
+    def profile(self, name: str, t: Array, x: Array, dense: DenseWaves) -> Array:
+        """(k, places) a quantity along a part by its name in `profiles`."""
+        values = np.empty((len(t), len(self.profiles[name][1])))
+        for observer, places, times, states in self._pieces(t, x):
+            values[places] = observer.profile(name, times, states, dense)
+        return values
+
+    def stored(self, t: Array, x: Array, dense: DenseWaves) -> dict[str, Array]:
+        """Stored energy by part."""
+        energies: dict[str, Array] = {}
+        for observer, places, times, states in self._pieces(t, x):
+            _fill(energies, observer.stored(times, states, dense), places, len(t))
+        return energies
+
+    def powers(self, t: Array, x: Array) -> tuple[dict[str, Array], dict[str, Array]]:
+        """Lost power and supplied power by part."""
+        lost: dict[str, Array] = {}
+        supplied: dict[str, Array] = {}
+        for observer, places, times, states in self._pieces(t, x):
+            for totals, powers in zip((lost, supplied), observer.powers(times, states), strict=True):
+                _fill(totals, powers, places, len(t))
+        return lost, supplied
+
+    def held(self, t: float, x: Array) -> dict[str, float]:  # noqa: ARG002
+        """All that is stored, by name, which is what the states (n,) of a motion through phases are."""
+        return dict(zip(self._names, x.tolist(), strict=False))  # waves may follow
+
+    def read_at(self, t: float) -> float:
+        """When inputs are read at a time in s, as in one phase."""
+        return self._at(t).observer.read_at(t)
+
+    def modes_at(self, t: float) -> dict[str, str]:
+        """The mode of every element at a time in s."""
+        regime = self._at(t).regime
+        return {element.name: name for element, name in zip(regime.elements, regime.modes, strict=True)}
+
+    def _at(self, t: float) -> Stretch:
+        return self._stretches[int(self._stretches.numbers(np.array([t]))[0])]
+
+    def part(self, name: str) -> Component:
+        """A component of the network, with the parameter values of this motion."""
+        return self._first.part(name)
+
+    def _pieces(self, t: Array, x: Array) -> Iterator[tuple[ModelObserver, Index, Array, Array]]:
+        names = self._names
+        for first, places in self._stretches.groups(t):
+            columns = [*map(names.index, first.regime.model.states), *range(len(names), x.shape[1])]
+            yield first.observer, places, self._sided(first.instants, t, places), x[places][:, columns]
+
+    @staticmethod
+    def _sided(instants: Timeline, t: Array, places: Index) -> Array:
+        """The times, and where an instant is listed twice and only its first is here, one before it."""
+        times = t[places].copy()
+        alone = np.append(t[1:] == t[:-1], False)[places] & ~np.isin(places + 1, places)
+        for k in np.flatnonzero(alone).tolist():
+            times[k] = instants.sides(float(times[k]))[0]
+        return times
+
+
+def _fill(totals: dict[str, Array], values_of: Mapping[str, Array], places: Index, count: int) -> None:
+    """Put what is known of parts at some places of `count` times to the rest of it."""
+    for name, values in values_of.items():
+        totals.setdefault(name, np.zeros(count))[places] = values
 
 
 def _impacts(run: HybridRun) -> tuple[Impact, ...]:
@@ -145,6 +283,21 @@ def _impacts(run: HybridRun) -> tuple[Impact, ...]:
     return tuple(by_time.values())
 
 
+def _without_detours(changes: list[Change]) -> list[Change]:
+    """Changes of one instant without those by which an element came back to a mode; but an impact stays."""
+    if len(changes) == 1 or any(change.impact for change in changes):
+        return changes
+    direct: list[Change] = []
+    for change in changes:
+        of_element = [earlier for earlier in direct if earlier.element is change.element]
+        back = next((k for k, earlier in enumerate(of_element) if earlier.before == change.after), None)
+        if back is None:
+            direct.append(change)
+        else:
+            direct = [earlier for earlier in direct if earlier not in of_element[back:]]
+    return direct
+
+
 def _events(changes: Iterable[Change]) -> Iterator[tuple[float, str, str, str]]:
     """Changes in words, without those that lead nowhere: what says the same before and after is none."""
 
@@ -152,7 +305,7 @@ def _events(changes: Iterable[Change]) -> Iterator[tuple[float, str, str, str]]:
     def in_words(element: ModeMachine, before: str, after: str, rebound: bool) -> tuple[str, str, str]:  # noqa: FBT001
         return element.name, element.modes[before].words, "rebound" if rebound else element.modes[after].words
 
-    at_once = (without_detours([*one_time]) for _, one_time in groupby(changes, attrgetter("time")))
+    at_once = (_without_detours([*one_time]) for _, one_time in groupby(changes, attrgetter("time")))
     for time, *change in chain.from_iterable(at_once):
         name, was, now = in_words(*change[:4])
         if was != now:
@@ -172,7 +325,7 @@ def _table(run: HybridRun) -> tuple[PhaseRow, ...]:
 
     rows: list[tuple[float, Mapping[str, str]]] = []
     for phase, end in zip(phases, [*(phase.start for phase in phases[1:]), last], strict=True):
-        modes = in_words(phase.modes)
+        modes = in_words(phase.regime.modes)
         if end > phase.start and not (rows and rows[-1][1] is modes):
             rows.append((phase.start, modes))
     ends = [*(start for start, _ in rows[1:]), last]

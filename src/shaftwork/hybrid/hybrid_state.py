@@ -1,26 +1,30 @@
-"""A moment of a motion through phases: modes, states, and how far rounding moves what ends the modes."""
+"""A moment of a motion through phases: modes, states, how far rounding moves the guards, and which are exceeded."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cached_property, partial
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
-from sympy import Expr
+from sympy import Expr, Integer
 
+from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.code import Moves
+from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.codegen.times.timeline import Timeline
+from shaftwork.components.branches import INTEGRAL
 from shaftwork.components.laws import t as TIME
-from shaftwork.components.modes import Mode
-from shaftwork.hybrid.modes.mode_equations import Limits, ModeEquations, Motion, Near
+from shaftwork.components.modes import Leave, Mode
+from shaftwork.formulation.form import StateForm
+from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import ActiveGuard, ModeMachine, ModeNames
 from shaftwork.integrate.problem import Guards, Problem, changed
 from shaftwork.pipeline.arguments import NOMINAL
+from shaftwork.pipeline.model import Model
 
 ROUNDINGS = 64.0
 """A guard within so many rounding units of zero is on its limit, and only its further course tells its side."""
@@ -33,9 +37,14 @@ AHEAD, AHEAD_OF_RUN = 1e-3, 1e-7
 """How far ahead the further course is looked at: parts of the time in which a state moves by its nominal size, and of
 the run."""
 GOLDEN = (5**0.5 - 1) / 2
+FEW = 4
+"""What a look ahead gains must be more than so many rounding units."""
 
 Course = tuple[float, list[float], list[float], list[float]]
 """Time, states, their rates, and guards."""
+
+Excess = tuple[float, ActiveGuard]
+"""How far a guard is beyond its limit, or will be."""
 
 
 class Change(NamedTuple):
@@ -54,63 +63,53 @@ class Change(NamedTuple):
     lost: Mapping[str, float] = MappingProxyType({})
 
 
-def together(changes: list[Change]) -> list[Change]:
-    """Changes of one instant, with those of each element in one; but an impact stays apart."""
-    if any(change.impact for change in changes):
-        return changes
-    by_element: dict[int, Change] = {}
-    for change in changes:
-        earlier = by_element.get(id(change.element), change)
-        by_element[id(change.element)] = change._replace(before=earlier.before)
-    return [change for change in by_element.values() if change.before != change.after]
+def differences(
+    t: float, elements: Sequence[ModeMachine], before: ModeNames, after: ModeNames, besides: Collection[int] = ()
+) -> list[Change]:
+    """The changes at a time in s from modes to others, in the order of the elements, but for some of these."""
+    triples = enumerate(zip(elements, before, after, strict=True))
+    return [Change(t, *names) for k, names in triples if k not in besides and names[1] != names[2]]
 
 
-def without_detours(changes: list[Change]) -> list[Change]:
-    """Changes of one instant without those by which an element came back to a mode; but an impact stays."""
-    if len(changes) == 1 or any(change.impact for change in changes):
-        return changes
-    direct: list[Change] = []
-    for change in changes:
-        of_element = [earlier for earlier in direct if earlier.element is change.element]
-        back = next((k for k, earlier in enumerate(of_element) if earlier.before == change.after), None)
-        if back is None:
-            direct.append(change)
-        else:
-            direct = [earlier for earlier in direct if earlier not in of_element[back:]]
-    return direct
-
-
-@dataclass(frozen=True, eq=False)
 class Regime:
-    """A combination of modes with everything that it takes to go on in it; made once for a run.
+    """A combination of modes with its equations, bound to the parameters of a run.
 
     Args:
         modes: of every element.
         assembly: the equations.
         p: their parameters, numbers of modes among them.
-        motion: rates and guards at an instant.
-        limits: the guards alone.
-        near: the guards around an instant, by the `moves` of the states.
-        sides: (guards,) on which each is met.
-        sizes: nominal size of each state.
-        watched: everything that may end one of the modes.
         tick: how far in s rounding moves the time.
         longest: how far in s the further course is looked at, at most.
-        successors: by guard, where it leads in place; told when it is first met.
     """
 
-    modes: ModeNames
-    assembly: ModeEquations
-    p: Array
-    motion: Motion
-    limits: Limits
-    near: Near
-    sides: Array
-    sizes: list[float]
-    watched: tuple[ActiveGuard, ...]
-    tick: float
-    longest: float
-    successors: dict[int, Any] = field(default_factory=dict)
+    def __init__(self, modes: ModeNames, assembly: ModeEquations, p: Array, tick: float, longest: float) -> None:
+        self.modes, self.assembly, self.p, self.tick, self.longest = modes, assembly, p, tick, longest
+        self.motion, self.limits, self.near = assembly.motion(p)
+        """Rates and guards at an instant; the guards alone; the guards around an instant, by the `moves` of states."""
+        self.sizes, self.sides, self.watched = assembly.sizes(p), assembly.sides(modes), assembly.watched(modes)
+        """Nominal size of each state; on which side each guard is met; everything that may end one of the modes."""
+        self.successors: dict[int, Any] = {}
+        """By guard, where it leads in place; told when it is first met."""
+
+    @property
+    def model(self) -> Model:
+        """The compiled equations."""
+        return self.assembly.model
+
+    @property
+    def form(self) -> StateForm:
+        """The state form of the equations."""
+        return self.assembly.model.form
+
+    @property
+    def stores(self) -> StateTransfer:
+        """What the equations store."""
+        return self.assembly.stores
+
+    @property
+    def bound(self) -> BoundArrays:
+        """The array program with its parameters."""
+        return self.assembly.bound(self.p)
 
     @property
     def elements(self) -> tuple[ModeMachine, ...]:
@@ -122,10 +121,15 @@ class Regime:
         return self.elements[number].modes[self.modes[number]]
 
     @cached_property
+    def problem(self) -> Problem:
+        """What is the same in all phases of these modes; the rest is empty."""
+        return self.assembly.problem(self.modes, self.p)
+
+    @cached_property
     def bends(self) -> bool:
         """Whether what is prescribed, a speed for one, depends on the time: near an instant it is no straight line."""
-        form = self.assembly.model.form
-        return any(form.graph.branches[source].template.law.has(TIME) for source in form.across_sources)
+        branches = self.form.graph.branches
+        return any(branches[source].template.law.has(TIME) for source in self.form.across_sources)
 
     @cached_property
     def ends(self) -> tuple[tuple[int, float], ...]:
@@ -155,6 +159,11 @@ class Regime:
         """A number that is made of an element's parameters."""
         return self.assembly.constant(number, expression, self.p)
 
+    def twist_limit(self, number: int, leave: Leave) -> tuple[float, float]:
+        """The twist in rad at which a mode ends by the twist of its element, and the slope of the guard there."""
+        slope = float(leave.when.diff(INTEGRAL))
+        return -self.constant(number, leave.when.xreplace({INTEGRAL: Integer(0)})) / slope, slope
+
     def course(self, t: float, x: list[float]) -> Course:
         """Rates and guards at a time in s, behind time and states."""
         return t, x, *self.motion(t, x)
@@ -177,7 +186,7 @@ class Regime:
         """
         now = here[3]
         bands = [abs(near - guard) for near, guard in zip(beside or self.limits(*self.beside(here)), now, strict=True)]
-        if not self.assembly.model.arrays.inputs.switching:
+        if not self.model.arrays.inputs.switching:
             return bands
         other = self.limits(*self.beside(here, -1.0))
         return [min(band, abs(near - guard)) for band, near, guard in zip(bands, other, now, strict=True)]
@@ -215,10 +224,21 @@ class HybridState(NamedTuple):
         """The speeds across elements at a time in s."""
         return self.regime.assembly.across(numbers, t, self.x, self.regime.p)
 
+    def stored(self, t: float) -> dict[str, float]:
+        """All that is stored, and what arrives by waves, by name, with the inputs of a time in s."""
+        regime, stores = self.regime, self.regime.stores
+        values = stores.of(lambda: regime.bound, np.array([t]), self.x[None, :])[0]
+        return dict(zip(stores.names, values.tolist(), strict=True)) | regime.assembly.arriving(self.x)
+
+    def differs(self, other: HybridState, t: float, least: float) -> bool:
+        """Whether what is stored at another moment of the same time in s differs by more than so much."""
+        stored, others = self.stored(t), other.stored(t)
+        return any(abs(others[name] - value) > least for name, value in stored.items())
+
     @property
     def top_speed(self) -> float:
         """The largest of the speeds that are states."""
-        return float(np.abs(self.x[: len(self.regime.assembly.model.form.across_states)]).max(initial=0.0))
+        return float(np.abs(self.x[: len(self.regime.form.across_states)]).max(initial=0.0))
 
     def problem(self, span: tuple[float, float], times: Timeline) -> Problem:
         """The motion of the phase, before it is told where it ends; tolerances are for rtol = 1.
@@ -226,8 +246,8 @@ class HybridState(NamedTuple):
         Its states are those of the equations and, behind them, the integrals of the guards in their `clocks`.
         """
         regime, assembly = self.regime, self.regime.assembly
-        whole = assembly.problem(regime.modes, regime.p)
-        sizes, guards = assembly.clock_sizes(span, self.x, regime.p), whole.guards
+        whole, sizes = regime.problem, assembly.clock_sizes(span, self.x, regime.p)
+        guards = whole.guards
         assert guards is not None  # noqa: S101 (which the equations give)
         now = np.abs(regime.limits(span[0], self.x.tolist()))
         return changed(
@@ -264,9 +284,114 @@ def clear_of_limit(beyond: float, band: float) -> float:
     return band / CLEAR or NOTHING
 
 
-def clear_of_limits(regime: Regime, now: Sequence[float], bands: Sequence[float]) -> list[float]:
-    """How far beyond zero each of the guards of a combination of modes is met."""
-    clear = [0.0] * len(now)
+def exceeded(
+    moment: HybridState,
+    t: float,
+    ended: HybridState,
+    idle: Sequence[ActiveGuard] = (),
+    *,
+    in_order: bool = False,
+    again: bool = False,
+) -> tuple[HybridState, list[Excess]]:
+    """The guards beyond their limits, or on them and about to go beyond, and how far; the moment with its bands.
+
+    Args:
+        moment: modes and states.
+        t: s.
+        ended: the moment before any change.
+        idle: guards that were met here already and change nothing.
+        in_order: whether the first one will be taken, and not the worst.
+        again: whether modes have come back.
+    """
+    regime, here = moment.regime, moment.course(t)
+    beside, now = regime.course(*regime.beside(here)), here[3]
+    bands = regime.bands(here, beside[3])
+    wide = bands
+    if ended.bands and ended.regime.assembly is regime.assembly:
+        wide = list(map(max, bands, ended.bands))
+    beyond, on_limit, clear = [], [], [0.0] * len(now)
     for active in regime.watched:
-        clear[active.guard] = clear_of_limit(active.side * now[active.guard], bands[active.guard])
-    return clear
+        band, value = wide[active.guard], active.side * now[active.guard]
+        clear[active.guard] = clear_of_limit(value, bands[active.guard])
+        if value < -band or active in idle:
+            continue
+        if value <= band or active.leave.rebound is not None:  # only what comes nearer is thrown back
+            on_limit.append(active)
+        elif value > 0:
+            beyond.append((value, active))
+    # impacts come first: torques are those of the motion after them
+    hits = [excess for excess in beyond if not excess[1].leave.by_torque]
+    # then what the time ends: what else gives way shows when all of that has changed
+    timed = [active for active in on_limit if active.leave.by_time]
+    hits = hits or (leaving(regime, here, beside, timed, again=False) if timed else [])
+    if on_limit and not hits:
+        soon_beyond = leaving(regime, here, beside, on_limit, again=again)
+        hits = [excess for excess in soon_beyond if excess[1].leave.rebound is not None]
+        beyond = beyond + soon_beyond if in_order else beyond or soon_beyond
+    return HybridState(regime, moment.x, clear), hits or beyond
+
+
+def leaving(regime: Regime, here: Course, beside: Course, on_limit: list[ActiveGuard], *, again: bool) -> list[Excess]:
+    """Of guards on their limit those that are about to go beyond it, and how far, as surely as rounding tells.
+
+    Args:
+        regime: the modes.
+        here: the course at the moment.
+        beside: rounding away from it.
+        on_limit: the guards.
+        again: whether modes have come back: then what hardly moves yet stays as it is, and its motion will tell. The
+            step may lie beyond an instant at which a law switches.
+    """
+    step = regime.ahead(here[2])
+    ahead, ahead_beside, beyond = here, beside, list[Excess]()
+    for _ in range(1 if again else 2):  # where nothing moves yet, its acceleration tells
+        ahead, ahead_beside = (_further(regime, step, course, bends=not again) for course in (ahead, ahead_beside))
+        moving = []
+        for active in on_limit:
+            k, side = active.guard, active.side
+            gain, other = side * (ahead[3][k] - here[3][k]), side * (ahead_beside[3][k] - beside[3][k])
+            units = abs(beside[3][k] - here[3][k]) / ROUNDINGS
+            if abs(gain) > max(abs(gain - other), FEW * units):
+                moving.append((gain, active))
+        beyond = [one for one in moving if one[0] > 0]
+        if beyond:
+            break
+        on_limit = [active for active in on_limit if all(active is not one for _, one in moving)]
+    return beyond
+
+
+def _further(regime: Regime, step: float, here: Course, *, bends: bool) -> Course:
+    """A step further along a straight line; where a prescribed speed bends along a parabola, as all do then (Heun)."""
+    ends = regime.course(*regime.later(here, step))
+    if not (bends and regime.bends):
+        return ends
+    t, x, rates, _ = here
+    return regime.course(
+        t + step, [v + step * (rate + end) / 2 for v, rate, end in zip(x, rates, ends[2], strict=True)]
+    )
+
+
+def passes_limit(moment: HybridState, t: float) -> bool:
+    """Whether the states are beyond a guard of the modes by more than rounding moves it."""
+    now = moment.regime.limits(t, moment.x.tolist())
+    wide = moment.bands or [0.0] * len(now)
+    return any(active.side * now[active.guard] > wide[active.guard] for active in moment.regime.watched)
+
+
+def resting(moment: HybridState, t: float) -> dict[int, str]:
+    """Elements that slip, with no speed across them as others hold their ends, and the modes in which they hold."""
+    regime, slipping = moment.regime, dict[int, ActiveGuard]()
+    for active in regime.watched:
+        k = active.element
+        modes, name = regime.elements[k].modes, regime.modes[k]
+        if active.leave.to and any(back.by_torque and back.to == name for back in modes[active.leave.to].leaves):
+            slipping[k] = active
+    if not slipping:
+        return {}
+    here = moment.course(t)
+    now, near, still = here[3], regime.limits(*regime.beside(here)), regime.assembly.resting
+    return {
+        k: active.leave.to
+        for k, active in slipping.items()
+        if (k in still and active.leave.by_speed) or now[active.guard] == near[active.guard] == 0.0
+    }

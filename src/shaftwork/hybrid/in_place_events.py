@@ -12,8 +12,7 @@ import numpy as np
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.hybrid.event_iteration import EventIteration
 from shaftwork.hybrid.hybrid_state import CLEAR, Change, HybridState, Regime, Transition, clear_of_limit
-from shaftwork.hybrid.modes.mode_equations import ModeEquations
-from shaftwork.hybrid.modes.mode_machines import ActiveGuard, ModeMachine, ModeNames, is_same, with_modes
+from shaftwork.hybrid.modes.mode_machines import ActiveGuard, ModeMachine, is_same, with_modes
 from shaftwork.integrate.problem import Reaction, SeriesError
 
 LATE = 1e4
@@ -25,15 +24,11 @@ class Phase(NamedTuple):
 
     Args:
         start: s.
-        modes: of every element.
-        assembly: the equations.
-        p: their parameters.
+        regime: the modes and their equations.
     """
 
     start: float
-    modes: ModeNames
-    assembly: ModeEquations
-    p: Array
+    regime: Regime
 
 
 Successor = tuple[Regime, Sequence[float], list[Change], Array | None]
@@ -92,7 +87,7 @@ class InPlaceEvents:
         """The modes that go on, and how far rounding moves each guard."""
         self._note: Callable[[float, list[Change]], None] | None = note
         self._size = moment.x.size
-        self.phases = [Phase(start, self.regime.modes, self.regime.assembly, self.regime.p)]
+        self.phases = [Phase(start, self.regime)]
         """The phases so far."""
         self._reactions: list[Reaction] = []
         self._suited: set[Regime] = set()
@@ -116,7 +111,7 @@ class InPlaceEvents:
             self._suited.add(regime)
         self.regime, self.bands = regime, bands
         self._note(t, changes)
-        self.phases.append(Phase(t, regime.modes, regime.assembly, regime.p))
+        self.phases.append(Phase(t, regime))
         reaction = Reaction(regime.values, regime.ends, bands, regime.equations, y)
         self._reactions.append(reaction)
         return reaction

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -16,12 +16,12 @@ from sympy import And, Expr, Float, Not, Or, Piecewise, Symbol, false, true
 from sympy.core.relational import Ge, Gt, Le, Lt, Relational
 
 from shaftwork.components.laws import t as TIME
-from shaftwork.components.modes import Mode, ModeChoice, Modes
+from shaftwork.components.modes import Mode, ModeChoice
 from shaftwork.core.errors import ParameterError
 from shaftwork.equations.kirchhoff import kirchhoff
 from shaftwork.equations.records import Equations, NamedPhase
 from shaftwork.formulation.form import StateForm, state_form
-from shaftwork.hybrid.modes.resting import at_rest
+from shaftwork.hybrid.modes.mode_machines import at_rest, elements_of
 from shaftwork.network.graph import CircuitGraph, GraphPart, build_graph
 from shaftwork.network.netlist import Netlist
 
@@ -76,8 +76,8 @@ def in_phase(netlist: Netlist, graph: CircuitGraph, phase: str) -> Netlist:
         ParameterError: no part or mode has this name.
     """
     chosen: dict[str, tuple[ModeChoice, ...]] = {}
-    for (_, part, _), mode in zip(_elements(graph), modes_in(graph, phase), strict=True):
-        chosen[part.name] = (*chosen.get(part.name, ()), ModeChoice(mode.form, mode.value))
+    for element, mode in zip(elements_of(graph), modes_in(graph, phase), strict=True):
+        chosen[element.part.name] = (*chosen.get(element.part.name, ()), ModeChoice(mode.form, mode.value))
     in_modes = netlist.with_choices(chosen)
     return at_rest(in_modes, state_form(build_graph(in_modes)))
 
@@ -97,8 +97,8 @@ def words_of_modes(graph: CircuitGraph, phase: str) -> dict[str, str]:
     Raises:
         ParameterError: no part or mode has this name.
     """
-    names = (name for name, _, _ in _elements(graph))
-    return {name: mode.words for name, mode in zip(names, modes_in(graph, phase), strict=True)}
+    pairs = zip(elements_of(graph), modes_in(graph, phase), strict=True)
+    return {element.name: mode.words for element, mode in pairs}
 
 
 def modes_in(graph: CircuitGraph, phase: str) -> tuple[Mode, ...]:
@@ -107,39 +107,26 @@ def modes_in(graph: CircuitGraph, phase: str) -> tuple[Mode, ...]:
     Raises:
         ParameterError: no part or mode has this name.
     """
-    named = _modes_in(graph, phase)
-    return tuple(named.get((part.name, modes.label), modes.options[0]) for _, part, modes in _elements(graph))
-
-
-def _modes_in(graph: CircuitGraph, phase: str) -> dict[tuple[str, str], Mode]:
-    """The modes that a phase names, by part and label of the element."""
     if not isinstance(phase, str):
         raise ParameterError(f"phase = {phase!r} must be a text such as 'gap open'. {known_modes(graph)}")
-    named: dict[tuple[str, str], Mode] = {}
-    for words in filter(None, (part.strip() for part in phase.split(","))):
-        part, modes, mode = _named(graph, words)
-        named[part.name, modes.label] = mode
-    return named
+    elements = elements_of(graph)
+    named = dict(_named(graph, words) for words in filter(None, (part.strip() for part in phase.split(","))))
+    return tuple(named.get(element.name, element.modes.options[0]) for element in elements)
 
 
-def _elements(graph: CircuitGraph) -> Iterator[tuple[str, GraphPart, Modes]]:
-    for part in graph.parts:
-        for modes in part.modes:
-            yield (f"{part.name}.{modes.label}" if modes.label else part.name), part, modes
-
-
-def _named(graph: CircuitGraph, words: str) -> tuple[GraphPart, Modes, Mode]:
-    for name, part, modes in _elements(graph):
-        for mode in modes.options:
-            if words in (f"{name} {mode.words}", f"{name} {mode.name}"):
-                return part, modes, mode
+def _named(graph: CircuitGraph, words: str) -> tuple[str, Mode]:
+    """The element and its mode of which some words are."""
+    for element in elements_of(graph):
+        for mode in element.modes.options:
+            if words in (f"{element.name} {mode.words}", f"{element.name} {mode.name}"):
+                return element.name, mode
     raise ParameterError(f"There is no phase '{words}'. {known_modes(graph)}")
 
 
 def known_modes(graph: CircuitGraph) -> str:
     """The parts that change their mode with their modes, as the end of a message."""
-    elements = _elements(graph)
-    options = [f"{name} {' | '.join(dict.fromkeys(m.words for m in modes.options))}" for name, _, modes in elements]
+    elements = elements_of(graph)
+    options = [f"{e.name} {' | '.join(dict.fromkeys(mode.words for mode in e.modes.options))}" for e in elements]
     return f"There are: {'; '.join(options)}." if options else "No part of this network changes its mode."
 
 
@@ -150,9 +137,9 @@ def span_of(graph: CircuitGraph, phase: str) -> Span:
         ParameterError: no part or mode has this name.
     """
     low, high = ALWAYS
-    for (_, part, modes), mode in zip(_elements(graph), modes_in(graph, phase), strict=True):
-        values = _values(graph, part)
-        spans = [_begins(other.starts, values) for other in modes.options if other.words == mode.words]
+    for element, mode in zip(elements_of(graph), modes_in(graph, phase), strict=True):
+        values = _values(graph, element.part)
+        spans = [_begins(other.starts, values) for other in element.modes.options if other.words == mode.words]
         first, last = min(begin for begin, _ in spans), max(end for _, end in spans)
         if first < last:  # no motion begins in a contact of rigid flanks, and it is at any time
             low, high = max(low, first), min(high, last)

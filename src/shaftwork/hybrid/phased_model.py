@@ -23,8 +23,7 @@ from shaftwork.formulation.form import StateForm
 from shaftwork.hybrid.event_iteration import EventIteration
 from shaftwork.hybrid.hybrid_run import HybridRun
 from shaftwork.hybrid.hybrid_solution import solution
-from shaftwork.hybrid.hybrid_state import HybridState
-from shaftwork.hybrid.modes.exceeded_guards import passes_limit
+from shaftwork.hybrid.hybrid_state import HybridState, passes_limit
 from shaftwork.hybrid.named_phases import known_modes, modes_in, whole_name, words_of
 from shaftwork.hybrid.phases import Phases
 from shaftwork.network.wording import listed
@@ -116,9 +115,10 @@ class PhasedModel(Model):
         return Phases(self, self._rebuild)
 
     def _motion(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
-        first = self.phases.assembly(self.phases.first)
-        prepared = first.prepared(first.vector(values, {}))
-        return in_its_size(first.model.form, prepared, demand, lambda sized: self._run_through(values, initial, sized))
+        first, p = self.phases.first_equations(values)
+        return in_its_size(
+            first.model.form, first.prepared(p), demand, lambda sized: self._run_through(values, initial, sized)
+        )
 
     def _run_through(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
         run = HybridRun(self.phases, values, demand)
@@ -139,26 +139,23 @@ class PhasedModel(Model):
 
     def _steady(self, values: Mapping[str, float], t: float, initial: Given) -> SteadyState:
         """Steady states of one set of equations after another, until no mode changes there."""
-        first = self.phases.assembly(self.phases.first)
-        when = t if math.isfinite(t) else first.model.settled(first.vector(values, {}))
+        first, p = self.phases.first_equations(values)
+        when = t if math.isfinite(t) else first.model.settled(p)
         settling = EventIteration(self.phases, values, (0.0, 1.0))
-        p = settling.regime(self.phases.first).p
-        moment = settling.started(when, initial_state(first.bound(p), initial or {}, when))
-        moment, _ = settling.settle(when, when, moment, None)
+        moment = settling.begun(when, initial_state(first.bound(p), initial or {}, when))
         for _ in range(MOST_CHANGES):
-            bound = moment.regime.assembly.bound(moment.regime.p)
+            bound = moment.regime.bound
             if not math.isfinite(t):
-                refuse_moving(bound, when, moment.regime.assembly.model.switching)
+                refuse_moving(bound, when, moment.regime.model.switching)
             ends = partial(_ends, moment, when)
             x = steady_state(bound, moment.x, when, ends=ends) if moment.x.size else moment.x
             beyond = ends(x)
             moment, changes = settling.settle(when, when, moment._replace(x=x), None)
             if not (changes or beyond):
                 if not math.isfinite(t):
-                    assembly = moment.regime.assembly
-                    warn_of_earlier_levels(assembly.bound(moment.regime.p), moment.x, when, assembly.model.switching)
+                    warn_of_earlier_levels(bound, moment.x, when, moment.regime.model.switching)
                 warn_of_held_torques(moment, when)
-                return SteadyState(settling.stored(moment, when), when)
+                return SteadyState(moment.stored(when), when)
         raise SimulationError(
             f"No steady operation was found: after {MOST_CHANGES} changes of its modes '{self.name}' still goes on, "
             f"with {self.words(moment)}. {another_start(self.form)}"
@@ -174,9 +171,8 @@ class PhasedModel(Model):
         """Time in s at a point, and the modes that go on there with their states; see `point`."""
         from shaftwork.frequency.analysis import moment_of, operating_point
 
-        first = self.phases.assembly(self.phases.first)
+        first, p = self.phases.first_equations(values)
         settling = EventIteration(self.phases, values, (0.0, 1.0))
-        p = settling.regime(self.phases.first).p
         if isinstance(at, Solution):
             time, stored = moment_of(at, self.states)
             time = time if t is None else in_si("t", t, "s")
@@ -184,7 +180,7 @@ class PhasedModel(Model):
         else:
             usual = 0.0 if at is None else first.model.settled(p)  # what rests has not begun to move
             time, x = operating_point(first.model, p, at, t, usual)
-        return time, settling.settle(time, time, settling.started(time, x), None)[0]
+        return time, settling.begun(time, x)
 
     def words(self, moment: HybridState) -> str:
         """The phase of a moment, "gap open, brake locked"."""
@@ -193,8 +189,8 @@ class PhasedModel(Model):
 
     def start_equations(self, values: Mapping[str, float]) -> BoundArrays:
         """The equations of the first phase, of which start values tell the states."""
-        first = self.phases.assembly(self.phases.first)
-        return first.bound(first.vector(values, {}))
+        first, p = self.phases.first_equations(values)
+        return first.bound(p)
 
 
 def _ends(moment: HybridState, t: float, x: Array) -> bool:
@@ -218,7 +214,7 @@ def warn_of_held_torques(moment: HybridState, when: float) -> None:
     ]
     if not (holding and x.size):
         return
-    bound = regime.assembly.bound(regime.p)
+    bound = regime.bound
     shares = np.random.default_rng(0).uniform(1.0, 2.0, x.size)  # no state makes up for another
     disturbed = shares / energy_weights(bound)
     left = lasting(bound, x, disturbed, when)

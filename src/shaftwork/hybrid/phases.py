@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
@@ -9,19 +10,21 @@ import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.components.modes import ModeChoice
-from shaftwork.core.errors import NetworkError, NetworkWarning, ParameterError
+from shaftwork.core.errors import NetworkError, NetworkWarning, ParameterError, SimulationError
 from shaftwork.core.kept import Kept
 from shaftwork.core.notices import muted
-from shaftwork.formulation.value_diagnosis import self_locks
+from shaftwork.formulation.value_diagnosis import jamming, self_locks
+from shaftwork.hybrid.hybrid_state import AHEAD_OF_RUN, ROUNDINGS, HybridState, Regime
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
-from shaftwork.hybrid.modes.mode_machines import ModeNames, elements_of, with_modes
+from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, ModeNames, at_rest, elements_of, with_modes
 from shaftwork.hybrid.modes.reactions import MANY, ReactionEquations, laws_that_hold
-from shaftwork.hybrid.modes.resting import at_rest
+from shaftwork.hybrid.starts import begins_anew
 from shaftwork.integrate import choice
 from shaftwork.integrate.engines import ADAMS, available
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.model import Model
+from shaftwork.pipeline.motion_start import Ending
 
 FOLLOWING = {
     "heyoka": (1.0, 1e-12),  # the cost grows only with the logarithm
@@ -33,8 +36,6 @@ FOLLOWING = {
 }
 """Engines that follow guards. An error grows with every change of mode, by some hundreds through sixty contacts, so
 they run with this part of the tolerance that is asked for, and with no looser one than the second number."""
-STILL = 1e-9
-"""A speed that is no more than this, where all speeds are about 1, is none."""
 _ENGINES = ", ".join(name for name in FOLLOWING if name not in (ADAMS, "wave"))
 
 
@@ -84,6 +85,15 @@ class Phases:
             raise assembly.with_traceback(None)  # else it would keep the frames of every time that it was raised
         return assembly
 
+    def first_equations(self, values: Mapping[str, float]) -> tuple[ModeEquations, Array]:
+        """The equations in the first mode of each element, and their parameters: start values are read in these.
+
+        Args:
+            values: parameters that differ from the network's.
+        """
+        first = self.assembly(self.first)
+        return first, first.vector(values, self.numbers(self.first))
+
     def running(self, modes: ModeNames, values: Mapping[str, float], engine: str) -> ModeEquations:
         """The equations in which a motion goes on: those of `assembly`, or one set for all that hold.
 
@@ -124,7 +134,7 @@ class Phases:
             return False
         x = np.random.default_rng(0).uniform(1.0, 2.0, len(assembly.model.states))  # no two alike by chance
         speeds = assembly.across(slipping, 0.0, assembly.joints(p).alike(x), p)
-        return any(abs(speed) < STILL for speed in speeds)
+        return any(abs(speed) < NO_IMPACT for speed in speeds)
 
     def _all_slipping(self, free: ModeNames) -> ReactionEquations | None:
         """One set of equations for all that hold, from the modes in which none does; None where there is none."""
@@ -190,3 +200,148 @@ class Phases:
     def tries_heyoka(self, assembly: ModeEquations) -> bool:
         """Whether heyoka has been taken for these equations in other modes: a stiff phase may be over at once."""
         return bool(self._easy.get(assembly))
+
+
+BEYOND = 1e-6
+"""How far in rad a motion may start beyond a rigid limit: errors and printed digits of another run leave so much."""
+
+
+class Regimes:
+    """The combinations of modes of a network for one set of values; each is made when it is first needed.
+
+    Args:
+        phases: the sets of equations.
+        values: parameters that differ from the network's.
+        span: start and end of the run, s.
+        equations: for a combination of modes.
+    """
+
+    def __init__(
+        self,
+        phases: Phases,
+        values: Mapping[str, float],
+        span: tuple[float, float],
+        equations: Callable[[ModeNames], ModeEquations],
+    ) -> None:
+        self._phases, self._values, self._equations = phases, dict(values), equations
+        self.first, self.elements = phases.first, phases.elements
+        self._times = ROUNDINGS * math.ulp(max(map(abs, span))), AHEAD_OF_RUN * (span[1] - span[0])
+        self._regimes: dict[ModeNames, Regime] = {}
+
+    def regime(self, modes: ModeNames) -> Regime:
+        """A combination of modes.
+
+        Raises:
+            NetworkError: the equations of these modes contradict each other, or a gear jams in them.
+        """
+        if modes not in self._regimes:
+            assembly = self._equations(modes)
+            form, p = assembly.model.form, assembly.vector(self._values, self._phases.numbers(modes))
+            if self._values and (jammed := tuple(jamming(form, {**assembly.model.parameters, **self._values}))):
+                raise NetworkError(f"'{form.graph.name}' cannot be assembled", jammed)
+            regime = Regime(modes, assembly, p, *self._times)
+            self._regimes.setdefault(modes, regime)  # another thread may have been first
+        return self._regimes[modes]
+
+    def possible(self, modes: ModeNames) -> bool:
+        """Whether the equations of these modes agree with each other."""
+        try:
+            self.regime(modes)
+        except NetworkError:
+            return False
+        return True
+
+    def joinable(self, modes: ModeNames, joins: Mapping[int, str]) -> Mapping[int, str]:
+        """Of elements and the modes in which they hold all that agree, the first before the others.
+
+        Beside a prescribed speed that is zero by now not all of them can.
+        """
+        if self.possible(with_modes(modes, joins)):
+            return joins
+        joined: dict[int, str] = {}
+        for k, name in joins.items():
+            if self.possible(with_modes(modes, {**joined, k: name})):
+                joined[k] = name
+        return joined
+
+    def taking(self, modes: ModeNames, t: float, stored: Mapping[str, float]) -> HybridState:
+        """A moment in the given modes that takes up what was stored, with the inputs of a time in s.
+
+        Raises:
+            NetworkError: the equations of these modes contradict each other.
+        """
+        new = self.regime(modes)
+        return HybridState(new, new.assembly.taking(t, stored, new.p))
+
+    def changed(self, moment: HybridState, t: float, modes: ModeNames) -> HybridState:
+        """The same instant in other modes: all that is stored goes over.
+
+        Raises:
+            NetworkError: the equations of these modes contradict each other.
+        """
+        new = self.regime(modes)
+        if new.assembly is moment.regime.assembly:
+            return HybridState(new, moment.x)
+        return self.taking(modes, t, moment.stored(t))
+
+    def resumed(self, ending: Ending) -> HybridState:
+        """The moment at which another motion ended, in its modes.
+
+        An element begins anew, as at a start, where a parameter has changed that says in which mode it starts.
+
+        Raises:
+            ParameterError: something is stored that it did not store, or a twist lies beyond a rigid limit.
+        """
+        first, t, loose = self.first, ending.read, self.regime(self.first)
+        ending.refuse_lacking(loose.stores.names)
+        parameters = dict(zip(loose.model.parameters, loose.p.tolist(), strict=True))
+        apart = self.taking(first, t, ending)
+        if ending.changed(parameters) - {element.number for element in self.elements}:
+            refuse_beyond(apart, t)
+        anew = [
+            begins_anew(e.part.name, e.modes, ending.modes.get(e.name), t, ending.parameters, parameters)
+            for e in self.elements
+        ]
+        fresh = loose.assembly.first_modes(t, apart.x, loose.p) if any(anew) else first
+        triples = zip(anew, fresh, self.elements, strict=True)
+        modes = tuple(name if begins else ending.modes[e.name] for begins, name, e in triples)
+        return self.taking(modes if self.possible(modes) else first, t, ending)
+
+
+def anew(moment: HybridState, t: float, number: int) -> str:
+    """The mode of an element in which a motion would start, other than the one that ends."""
+    regime, before = moment.regime, moment.regime.modes[number]
+    for late in (0.0, regime.ahead(moment.course(t)[2])):  # by rounding, what ends the mode may not be true yet
+        to = regime.assembly.start_of(number, before, t + late, moment.moved(t, late).x, regime.p)
+        if to:
+            return to
+    element = regime.elements[number]
+    raise SimulationError(
+        f"'{element.name}' is no more {element.modes[before].words} at t = {t:.9g} s, and starts in none of its "
+        "other modes. Give one of them a condition that holds there, Mode(starts=...)."
+    )
+
+
+def refuse_beyond(moment: HybridState, t: float) -> None:
+    """Refuse a start beyond a rigid limit, where no motion leads.
+
+    Args:
+        moment: in the modes in which nothing is joined.
+        t: s.
+
+    Raises:
+        ParameterError: names the part, its twist and the limit.
+    """
+    regime = moment.regime
+    now = regime.limits(t, moment.x.tolist())
+    for active in regime.watched:
+        element, beyond = regime.elements[active.element], active.side * now[active.guard]
+        if active.leave.rebound is None or not beyond > BEYOND:
+            continue
+        limit, slope = regime.twist_limit(active.element, active.leave)
+        raise ParameterError(
+            f"{type(element.part.component).__name__} '{element.name}' would start at a twist of "
+            f"{limit + beyond / slope:.9g} rad, {'above its upper' if slope > 0 else 'below its lower'} limit of "
+            f"{limit:.9g} rad, and it is rigid. Give a twist inside the limits, "
+            f"initial={{'{element.name}.phi': ...}}, or a stiffness c."
+        )

@@ -149,7 +149,5 @@ def _start(
     """The states by name, and where they start, in the equations in which nothing is joined."""
     if not model.phased:
         return tuple(model.states), model.start(model.prepare(model.vector(values)), initial, span)[0]
-    phases = cast("PhasedModel", model).phases
-    assembly = phases.assembly(phases.first)
-    p = assembly.vector(values, phases.numbers(phases.first))
+    assembly, p = cast("PhasedModel", model).phases.first_equations(values)
     return tuple(assembly.model.states), assembly.model.start(assembly.prepared(p), initial, span)[0]

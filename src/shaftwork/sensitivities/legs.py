@@ -173,8 +173,7 @@ def _through_phases(model: PhasedModel, span: tuple[float, float], initial: Give
 
 def _start(run: HybridRun, initial: Given) -> Leg:
     phases, span = run.phases, run.demand.span
-    assembly = phases.assembly(phases.first)
-    p = assembly.vector({}, phases.numbers(phases.first))
+    assembly, p = phases.first_equations({})
     x, _ = assembly.model.start(assembly.prepared(p), initial, span)
     after = run.timeline(assembly, p).sides(span[0])[1]
     return Leg(
@@ -213,15 +212,15 @@ def _legs_of_run(run: HybridRun) -> Iterator[Leg]:
         starts = [phase.start for phase in span.phases]
         for phase, (start, stop) in zip(span.phases, pairwise([*starts, end]), strict=True):
             if stop > start:
-                assembly, p = phase.assembly, phase.p
+                assembly, p = phase.regime.assembly, phase.regime.p
                 instants = run.timeline(assembly, p)
                 leg = _leg(assembly.model, p, _states(span), span.trajectory.steps, (start, stop), instants)
-                yield replace(leg, assembly=assembly, modes=phase.modes)
+                yield replace(leg, assembly=assembly, modes=phase.regime.modes)
 
 
 def _states(span: Span) -> Callable[[Array], Array]:
     """Those of the equations, without their clocks."""
-    size, dense = len(span.phases[0].assembly.model.states), span.trajectory.dense
+    size, dense = len(span.phases[0].regime.model.states), span.trajectory.dense
     return lambda times: dense(times)[:, :size]
 
 

@@ -10,8 +10,7 @@ import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import CompileError
-from shaftwork.hybrid.hybrid_state import AHEAD, AHEAD_OF_RUN, CLEAR, EPS, GOLDEN, NOTHING, ROUNDINGS
-from shaftwork.hybrid.modes.exceeded_guards import FEW
+from shaftwork.hybrid.hybrid_state import AHEAD, AHEAD_OF_RUN, CLEAR, EPS, FEW, GOLDEN, NOTHING, ROUNDINGS
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import with_modes
 from shaftwork.hybrid.phased_model import PhasedModel
@@ -35,9 +34,7 @@ class PhasedEnsemble(Ensemble):
         return cast("PhasedModel", self.model).phases
 
     def _first_modes(self, values: Mapping[str, float]) -> ModeNames:
-        phases = self._phases
-        assembly = phases.assembly(phases.first)
-        p = assembly.vector(dict(values), phases.numbers(phases.first))
+        assembly, p = self._phases.first_equations(values)
         return assembly.first_modes(self.span[0], np.zeros(len(assembly.model.states)), p)
 
     def _equations_in(self, modes: ModeNames) -> EnsembleEquations:

@@ -67,12 +67,6 @@ class ReadingMatrices:
             for histories in (self._unit_histories(bound, place) for place in range(4))
         ]
 
-    @property
-    def plain(self) -> tuple[Any, Any] | None:
-        """X and U of scipy.sparse; None where rates are read as well."""
-        by_state, by_input, by_slope, by_rate = self._matrices
-        return (by_state.sparse, by_input.sparse) if by_rate.is_zero and by_slope.is_zero else None
-
     def _unit_histories(self, bound: BoundArrays, place: int) -> Iterator[GivenHistory]:
         """One column for each of what is given at a place: states, inputs, rates of inputs, rates of states."""
         for one in _units(bound, self._sizes[place]):

@@ -19,7 +19,7 @@ Source: Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts, 1996,
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from operator import itemgetter
 from typing import NamedTuple
 
@@ -27,19 +27,110 @@ import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.mobility import Mobility, complementary
+from shaftwork.components.branches import ACROSS
 from shaftwork.components.modes import Leave
 from shaftwork.core.errors import SimulationError
 from shaftwork.core.kept import Kept
-from shaftwork.hybrid.hybrid_state import HybridState, Regime
-from shaftwork.hybrid.impacts.impact_contacts import Contact, in_turn, lasting, nodes, opens_at, touching
-from shaftwork.hybrid.impacts.impulses import Blow, ImpactStage, ImpactStart, Impulses, summed
-from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, GivesWay, ModeNames, limited, with_modes
-from shaftwork.hybrid.regimes import Regimes
+from shaftwork.hybrid.hybrid_state import CLEAR, NOTHING, HybridState, Regime
+from shaftwork.hybrid.impacts.impulses import NOTHING_OF, Blow, ImpactStage, ImpactStart, Impulses, summed
+from shaftwork.hybrid.modes.mode_equations import KEPT
+from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, GivesWay, ModeMachine, ModeNames, limited, with_modes
+from shaftwork.hybrid.phases import Regimes
 
-MOBILITIES = 64
-"""Sets of contacts of which what impulses do is kept."""
-ROUNDED = 64 * float(np.finfo(float).eps)
-"""Speeds at which contacts close that are less than this part of the largest speed are what rounding leaves."""
+
+class Contact(NamedTuple):
+    """What cannot close further, be it closed or only touching.
+
+    Args:
+        number: of the element.
+        side: 1 where it opens as the speed across it rises, -1 where as that falls.
+        apart: mode in which it is open.
+        joined: mode in which it is closed.
+        leave: by which it closes; None where it is closed already.
+        restitution: of what it hits with, and
+        rest: speed up to which nothing is thrown back.
+    """
+
+    number: int
+    side: float
+    apart: str
+    joined: str
+    leave: Leave | None = None
+    restitution: float = 0.0
+    rest: float = 0.0
+
+    def share_back(self, opens: float) -> float:
+        """The share of the speed at which it closes that comes back, for the speed at which it opens."""
+        return self.restitution if -opens * self.restitution > self.rest else 0.0
+
+
+def lasting(elements: Sequence[ModeMachine], modes: ModeNames) -> Iterator[Contact]:
+    """Contacts that are closed, and freewheels."""
+    for k, (element, name) in enumerate(zip(elements, modes, strict=True)):
+        mode = element.modes[name]
+        if (side := element.opening_side(name)) is not None:
+            yield Contact(k, side, mode.gives_way[0][1], name)
+        for leave in mode.leaves:
+            side = element.opening_side(leave.to) if leave.to and leave.when == ACROSS else None
+            if side is not None:
+                yield Contact(k, side, name, leave.to, leave)
+
+
+def touching(t: float, moment: HybridState, number: int, leave: Leave) -> Iterator[Contact]:
+    """Contacts that are closed or touch, freewheels, and the element of a number, which wants to close by a `leave`."""
+    regime, here = moment.regime, moment.course(t)
+    elements, now, bands = regime.elements, here[3], regime.bands(here)
+    closed = [*lasting(elements, regime.modes)]
+    yield from closed
+    yield from _other_flanks(moment, closed)
+    for active in regime.watched:
+        k, closes, guard = active.element, active.leave, active.guard
+        wants = k == number and closes.to == leave.to
+        touches = closes.rebound is not None and active.side * now[guard] > -CLEAR * bands[guard]
+        side = elements[k].opening_side(closes.to) if (wants or touches) and closes.to else None
+        if side is not None and not any(c.number == k and c.joined == closes.to for c in closed):
+            yield _closing(moment, k, side, leave if wants else closes)
+
+
+def _other_flanks(moment: HybridState, closed: Sequence[Contact]) -> Iterator[Contact]:
+    """Flanks that touch while the other one of their element is closed, as there is no gap between them."""
+    regime = moment.regime
+    for contact in closed:
+        element, place = regime.elements[contact.number], regime.assembly.twist(contact.number)
+        for leave in element.modes[contact.apart].leaves if place is not None else ():
+            if leave.rebound is None or leave.to == contact.joined:
+                continue
+            side, (limit, slope) = element.opening_side(leave.to), regime.twist_limit(contact.number, leave)
+            if side is not None and slope * (moment.x[place] - limit) > -NOTHING:
+                yield _closing(moment, contact.number, side, leave, contact.apart)
+
+
+def _closing(moment: HybridState, number: int, side: float, leave: Leave, apart: str = "") -> Contact:
+    """What closes by a `leave` from the mode that it is in, or from another one in which it is apart."""
+    restitution, rest = (moment.regime.constant(number, expression) for expression in (leave.rebound, leave.rest))
+    return Contact(number, side, apart or moment.regime.modes[number], leave.to, leave, restitution, rest)
+
+
+def nodes(moment: HybridState, contact: Contact) -> tuple[int, int]:
+    """The nodes of a contact, that first whose speed opens it."""
+    element = moment.regime.elements[contact.number]
+    part = moment.regime.assembly.parts[element.part.name]
+    first, second = map(part.node_at, part.ends_of(element.modes)[:: int(contact.side)])
+    return first, second
+
+
+def opens_at(t: float, moment: HybridState, contacts: Sequence[Contact]) -> list[float]:
+    """The speeds at which contacts open."""
+    speeds = moment.speeds([contact.number for contact in contacts], t)
+    return [contact.side * speed for contact, speed in zip(contacts, speeds, strict=True)]
+
+
+def in_turn(t: float, moment: HybridState, contacts: list[Contact]) -> list[Contact]:
+    """The contacts that take part where impacts follow each other: of those that throw back only the fastest."""
+    speeds = {c: -opens for c, opens in zip(contacts, opens_at(t, moment, contacts), strict=True)}
+    thrown = [speed for c, speed in speeds.items() if c.share_back(-speed)]
+    fastest = (1 - NO_IMPACT) * max(thrown, default=0.0)
+    return [c for c, speed in speeds.items() if not (thrown and c.restitution) or speed >= fastest]
 
 
 class Collision(NamedTuple):
@@ -72,7 +163,7 @@ class Collisions:
     def __init__(self, regimes: Regimes, impulses: Impulses, *, together: bool) -> None:
         self._regimes, self._elements = regimes, regimes.elements
         self._impulses, self._together = impulses, together
-        self._mobilities = Kept[tuple[Regime, tuple[tuple[int, int], ...]], Mobility](MOBILITIES)
+        self._mobilities = Kept[tuple[Regime, tuple[tuple[int, int], ...]], Mobility](KEPT)
 
     def impact(self, t: float, moment: HybridState, number: int, leave: Leave) -> Collision:
         """The impact of an element that closes.
@@ -94,8 +185,8 @@ class Collisions:
 
         # without a gap the other flank of the element touches too; of two that are closed the last one tells the mode
         candidates = sorted(touching(t, moment, number, leave), key=is_wanted)
-        meets = -min(opens_at(t, moment, candidates), default=0.0) > ROUNDED * moment.top_speed
-        contacts = self._in_turn(t, moment, candidates) if meets else candidates
+        meets = -min(opens_at(t, moment, candidates), default=0.0) > NOTHING_OF * moment.top_speed
+        contacts = in_turn(t, moment, candidates) if meets and not self._together else candidates
         before = np.array(opens_at(t, moment, contacts))
         back = np.array([meets * c.share_back(u) for c, u in zip(contacts, before.tolist(), strict=True)])
         elastic = {c.number for c, share in zip(contacts, back.tolist(), strict=True) if share >= 1}
@@ -104,7 +195,7 @@ class Collisions:
         both_ways = tuple[Contact, ...]()
         if all(contact.number != number for contact in contacts):  # it carries both ways, as a switch that closes
             both_ways = (Contact(number, 0.0, modes[number], leave.to),)
-            stages = self._joined(t, begins, {number: leave.to}, contacts)
+            stages = self.joined(t, begins, {number: leave.to})
             begins = self._impulses.begins(stages[-1].blow.after, t)
         stages += self._compressed(t, begins, contacts)
         if back.any():
@@ -178,15 +269,15 @@ class Collisions:
             self._regimes.changed(after, t, with_modes(modes, {c.number: c.joined for c in some}))
             for some in (closed, pressed)
         )
-        if not open_yet or not self._regimes.differ(t, new, apart, least):
+        if not open_yet or not new.differs(apart, t, least):
             return new, closed, ()
         further = tuple[ImpactStage, ...]()
         while open_yet:
             speed, contact = min(zip(opens_at(t, apart, open_yet), open_yet, strict=True), key=itemgetter(0))
             if speed >= -least:
                 break
-            joined = self._joined(t, self._impulses.begins(apart, t), {contact.number: contact.joined}, contacts)
-            if self._regimes.differ(t, apart, joined[-1].blow.after, least):
+            joined = self.joined(t, self._impulses.begins(apart, t), {contact.number: contact.joined})
+            if apart.differs(joined[-1].blow.after, t, least):
                 further += joined
             apart = joined[-1].blow.after
             open_yet.remove(contact)
@@ -208,16 +299,12 @@ class Collisions:
 
         return self._impulses.stages(t, begins, compressed)
 
-    def joined(self, t: float, moment: HybridState, joins: Mapping[int, str]) -> HybridState:
-        """What follows where elements are joined at once, by what impulses it takes."""
-        return self._joined(t, self._impulses.begins(moment, t), joins, ())[-1].blow.after
+    def joined(self, t: float, begins: ImpactStart, joins: Mapping[int, str]) -> tuple[ImpactStage, ...]:
+        """Elements are joined at once, by what impulses it takes."""
 
-    def _joined(
-        self, t: float, begins: ImpactStart, joins: Mapping[int, str], contacts: Sequence[Contact]
-    ) -> tuple[ImpactStage, ...]:
         def joined(start: ImpactStart, _: Sequence[ImpactStage]) -> Blow:
             after = self._regimes.changed(start.moment, t, with_modes(start.moment.regime.modes, joins))
-            return Blow(after, after.regime, np.zeros(len(contacts)))
+            return Blow(after, after.regime)
 
         return self._impulses.stages(t, begins, joined)
 
@@ -267,7 +354,7 @@ class Collisions:
         """The moment in some modes, but with all contacts open, and what rubs slipping."""
         apart = {k: sides[0][1] for k, sides in self._rubbing(modes).items()} | {c.number: c.apart for c in contacts}
         loose = with_modes(modes, apart)
-        return self._impulses.begins(self._regimes.taking(loose, t, self._regimes.stored(moment, t)), t)
+        return self._impulses.begins(self._regimes.taking(loose, t, moment.stored(t)), t)
 
     def _rubbing(self, modes: ModeNames) -> dict[int, GivesWay]:
         """Elements that hold by torques limited on both sides, with the modes to which these lead."""
@@ -284,23 +371,9 @@ class Collisions:
     def _mobility(self, t: float, moment: HybridState, contacts: Sequence[Contact]) -> tuple[Mobility, Array]:
         """The answer to impulses of contacts, and the speeds at which they open; zero where no impulse passes."""
         regime, pairs = moment.regime, tuple(nodes(moment, contact) for contact in contacts)
-        stores, p = regime.assembly.stores, regime.p
+        stores, p = regime.stores, regime.p
         mobility = self._mobilities((regime, pairs), lambda: stores.mobility(regime.assembly.bound(p), pairs))
         return mobility, np.where(mobility.has_inertia, opens_at(t, moment, contacts), 0.0)
-
-    def _in_turn(self, t: float, moment: HybridState, contacts: list[Contact]) -> list[Contact]:
-        return contacts if self._together else in_turn(t, moment, contacts)
-
-    def fastest(self, t: float, moment: HybridState, number: int, leave: Leave) -> Contact | None:
-        """Of what closes and is thrown back what closes fastest, first the element that is given; None where none is.
-
-        Args:
-            t, moment, number, leave: as in `impact`.
-        """
-        contacts = self._in_turn(t, moment, [*touching(t, moment, number, leave)])
-        opens = opens_at(t, moment, contacts)
-        thrown = (c for c, speed in zip(contacts, opens, strict=True) if c.share_back(speed))
-        return min(thrown, key=lambda contact: contact.number != number, default=None)
 
 
 def _blow(moment: HybridState, mobility: Mobility, impulses: Array) -> Blow:
@@ -311,7 +384,7 @@ def _blow(moment: HybridState, mobility: Mobility, impulses: Array) -> Blow:
 
 def _pressed(stages: Sequence[ImpactStage]) -> Array:
     """(contacts,) the impulses of all stages."""
-    return np.asarray(np.sum([stage.share * stage.blow.pressed for stage in stages], axis=0))
+    return np.asarray(sum(stage.share * stage.blow.pressed for stage in stages))
 
 
 def _of_energy(energy: float, shares: Array, opens: Array, W: Array) -> Array:

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
 from dataclasses import replace
-
-from sympy import Integer
 
 from shaftwork.codegen.model_observer import Impact
 from shaftwork.components.branches import INTEGRAL
 from shaftwork.components.modes import Leave, Mode
 from shaftwork.core.errors import NetworkError, SimulationError
-from shaftwork.hybrid.hybrid_state import CLEAR, Change, HybridState, Transition
-from shaftwork.hybrid.impacts.collisions import Collisions
+from shaftwork.hybrid.hybrid_state import CLEAR, Change, HybridState, Transition, differences
+from shaftwork.hybrid.impacts.collisions import Collisions, in_turn, opens_at, touching
 from shaftwork.hybrid.impacts.impulses import Blow, ImpactStage, Impulses
 from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, ActiveGuard, ModeNames, limited, with_modes
-from shaftwork.hybrid.regimes import Regimes
+from shaftwork.hybrid.phases import Regimes
 
 
 class Impacts:
@@ -29,7 +26,7 @@ class Impacts:
 
     def __init__(self, regimes: Regimes, *, together: bool) -> None:
         self._regimes, self._elements = regimes, regimes.elements
-        self._impulses = Impulses(regimes)
+        self._impulses, self._together = Impulses(regimes), together
         self._collisions = Collisions(regimes, self._impulses, together=together)
         self.gears = self._impulses.gears
 
@@ -49,7 +46,7 @@ class Impacts:
         except NetworkError:
             return speed
         # between dampers alone a speed is whatever their torques make it: joining them stops no inertia
-        return speed if self._regimes.differ(t, moment, joined, least) else 0.0
+        return speed if moment.differs(joined, t, least) else 0.0
 
     def hit(
         self, t: float, after: float, moment: HybridState, ended: ActiveGuard
@@ -71,9 +68,12 @@ class Impacts:
 
     def _fastest(self, t: float, moment: HybridState, ended: ActiveGuard) -> ActiveGuard:
         """Of what is hit at an instant in s the guard of what closes fastest: impacts follow each other."""
-        contact = self._collisions.fastest(t, moment, ended.element, ended.leave)
-        if contact is None or contact.number == ended.element:
+        contacts = [*touching(t, moment, ended.element, ended.leave)]
+        contacts = contacts if self._together else in_turn(t, moment, contacts)
+        thrown = [c for c, opens in zip(contacts, opens_at(t, moment, contacts), strict=True) if c.share_back(opens)]
+        if not thrown or any(contact.number == ended.element for contact in thrown):
             return ended
+        contact = thrown[0]
         return next(active for active in moment.regime.watched if active.leave is contact.leave)
 
     def _collided(self, t: float, after: float, moment: HybridState, number: int, leave: Leave) -> Transition:
@@ -91,7 +91,7 @@ class Impacts:
                 new = self._at_limit(new, contact.number, contact.leave)
         new = self._staying(after, regime.modes, new)
         besides = {contact.number for contact in contacts}
-        changes = [*hits, *self._differences(t, regime.modes, new.regime.modes, besides)]
+        changes = [*hits, *differences(t, self._elements, regime.modes, new.regime.modes, besides)]
         self._refuse_gain(after, moment, new, hits[0])
         return new, changes
 
@@ -125,9 +125,9 @@ class Impacts:
             moment: what was before.
             new: after it, with all stopped that is joined.
         """
-        stored, names = self._regimes.stored(moment, t), moment.regime.assembly.stores.names
+        stored, names = moment.stored(t), moment.regime.stores.names
         least = NO_IMPACT * max([1.0, *(abs(stored[name]) for name in names)])
-        if not self._regimes.differ(t, moment, new, least):
+        if not moment.differs(new, t, least):
             return new
         return self._collisions.pulled(t, t, moment, new.regime.modes, least)[0]
 
@@ -151,17 +151,16 @@ class Impacts:
             speed, later = (slope * one.across(k, t) for one in (moment, moment.moved(t, 1.0)))
             if speed**2 < 4 * (later - speed) * CLEAR * bands[active.guard]:
                 closed[k] = before[k]
-        return self._collisions.joined(t, moment, closed) if closed else moment
+        return self._collisions.joined(t, self._impulses.begins(moment, t), closed)[-1].blow.after if closed else moment
 
     @staticmethod
     def _at_limit(moment: HybridState, number: int, leave: Leave) -> HybridState:
         """What stays in contact is on its limit: from a little beyond it each flight would gain speed."""
-        assembly, slope = moment.regime.assembly, leave.when.diff(INTEGRAL)
-        place = assembly.twist(number)
-        if place is None or not slope:
+        place = moment.regime.assembly.twist(number)
+        if place is None or not leave.when.has(INTEGRAL):
             return moment
         x = moment.x.copy()
-        x[place] = -moment.regime.constant(number, leave.when.xreplace({INTEGRAL: Integer(0)}) / slope)
+        x[place], _ = moment.regime.twist_limit(number, leave)
         return moment._replace(x=x)
 
     def _refuse_gain(self, t: float, moment: HybridState, new: HybridState, hits: Change) -> None:
@@ -170,8 +169,8 @@ class Impacts:
         Raises:
             SimulationError: no combination of modes that was tried passes the impulse on without a gain.
         """
-        stores, bound = moment.regime.assembly.stores, moment.regime.assembly.bound(moment.regime.p)
-        had, has = (stores.energy(bound, self._regimes.stored(one, t)) for one in (moment, new))
+        stores, bound = moment.regime.stores, moment.regime.bound
+        had, has = (stores.energy(bound, one.stored(t)) for one in (moment, new))
         if has - had > sum(hits.given.values()) + NO_IMPACT * max(had, has):
             raise SimulationError(
                 f"The impact of '{hits.element.name}' at t = {hits.time:.9g} s would raise the stored energy from "
@@ -193,22 +192,16 @@ class Impacts:
             after: the same just after it.
         """
         regime, begins = moment.regime, self._impulses.begins(moment, before)
-        new = moment._replace(x=regime.assembly.bound(regime.p).impulse(moment.x, before, after))
+        new = moment._replace(x=regime.bound.impulse(moment.x, before, after))
         stages: tuple[ImpactStage, ...] = (ImpactStage(begins, Blow(new, regime), 1.0),)
         # where springs alone take the jump up no impulse passes, and rounding would tell the way of it through gears
-        stored = self._regimes.stored(new, after)
+        stored = new.stored(after)
         passes = any(abs(v - begins.stored[name]) > NO_IMPACT * max(abs(v), 1.0) for name, v in stored.items())
         if passes and (self.gears or limited(self._elements, regime.modes)):
             new, stages = self._collisions.pulled(before, after, moment, regime.modes, NO_IMPACT)
         given = self._impulses.given(after, stages, before)
         at_once = Impact(t, "", given, self._impulses.lost(after, stages))
-        return new, self._differences(t, regime.modes, new.regime.modes), at_once
-
-    def _differences(
-        self, t: float, before: ModeNames, after: ModeNames, besides: Collection[int] = ()
-    ) -> list[Change]:
-        pairs = enumerate(zip(self._elements, before, after, strict=True))
-        return [Change(t, *names) for k, names in pairs if k not in besides and names[1] != names[2]]
+        return new, differences(t, self._elements, regime.modes, new.regime.modes), at_once
 
 
 def _late(t: float, moment: HybridState, met: ActiveGuard) -> float:

@@ -22,7 +22,7 @@ from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.hybrid.hybrid_state import EPS, ROUNDINGS, HybridState, Regime
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import ModeNames, with_modes
-from shaftwork.hybrid.regimes import Regimes
+from shaftwork.hybrid.phases import Regimes
 
 MOST_STAGES = 100
 """So many times gears may come to rest in one impact."""
@@ -42,7 +42,7 @@ class Blow(NamedTuple):
 
     after: HybridState
     passing: Regime
-    pressed: Array = np.zeros(0)
+    pressed: Array | float = 0.0
     through: Array | float = 0.0
 
 
@@ -78,7 +78,7 @@ class Impulses:
     def begins(self, moment: HybridState, t: float) -> ImpactStart:
         """Where an impact begins, with the inputs of a time in s."""
         speeds = dict(zip(self.gears, moment.speeds(self.gears, t), strict=True))
-        return ImpactStart(moment, t, self._regimes.stored(moment, t), speeds)
+        return ImpactStart(moment, t, moment.stored(t), speeds)
 
     def stages(
         self, t: float, start: ImpactStart, blow: Callable[[ImpactStart, Sequence[ImpactStage]], Blow]
@@ -205,7 +205,7 @@ class Impulses:
 
     def _stopping(self, t: float, start: ImpactStart, after: HybridState) -> Iterator[tuple[float, float, int, str]]:
         """Gears that would turn round: their speeds before and after, negative the way they turn, and what follows."""
-        states = (one.x[: len(one.regime.assembly.model.states)] for one in (start.moment, after))
+        states = (one.x[: len(one.regime.model.states)] for one in (start.moment, after))
         least = NOTHING_OF * max(np.abs(x).max(initial=0.0) for x in states)
         for k, speed in start.speeds.items():
             speeds = speed, after.across(k, t)
@@ -227,7 +227,7 @@ class Impulses:
 
     def _gained(self, t: float, start: ImpactStart, blow: Blow) -> dict[str, float]:
         """What all that is stored gains by the whole of an impulse."""
-        then = self._regimes.stored(blow.after, t)
+        then = blow.after.stored(t)
         return {name: then[name] - value for name, value in start.stored.items()}
 
     def given(self, t: float, stages: Sequence[ImpactStage], before: float | None = None) -> dict[str, float]:

@@ -7,26 +7,105 @@ A stuck friction, a locked brake and an engaged clutch pass what keeps the speed
 with G the speeds across what is held, from the speeds of inertias, and lambda in the place of its law. So one set of
 equations serves for whatever holds and whatever slips; an impact by which they come to one speed takes the place of
 lambda in the same system. Source: Brogliato, Nonsmooth Mechanics, 2016.
+
+With R and P made of the inertias and of what holds, and f the rates without reactions, lambda_h = R_h f and x' = P f;
+where nothing holds, R is zero and P the unit matrix. Both have entries for the states of one group alone, which such
+laws connect. Where groups are small these are numbers in explicit rows (`HeldRows`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
+import networkx as nx
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
+from sympy import Add, Expr, Symbol
 
 from shaftwork.codegen.array_form.arrays import ArrayProgram, BoundArrays
 from shaftwork.codegen.array_form.elements import ROUNDING, Array
 from shaftwork.codegen.array_form.matrices import LinearPart
 from shaftwork.codegen.array_form.products import Factor
 from shaftwork.codegen.state_transfer import StateTransfer
+from shaftwork.formulation.explicit_rows import Rows
 from shaftwork.formulation.form import StateForm
-from shaftwork.hybrid.modes.held_rows import HeldRows
+
+LARGEST_GROUP = 8
+"""States that such laws may connect: each of their rows has as many terms. With 15, rows take twenty times as long to
+compile as matrices, and run slower."""
+FRAME = -1
+
+Entries = dict[tuple[int, int], Symbol]
+"""Symbols in place of the entries of a matrix, by row and column."""
+
+
+class HeldRows:
+    """The rows of a network in which laws may hold their ends together.
+
+    Args:
+        rows: of the equations in which none does.
+        laws: branches of what may hold; they are zero while they do.
+        groups: the places of the states that they connect, see `groups`.
+    """
+
+    def __init__(self, rows: Rows, laws: Sequence[tuple[int, set[int]]], groups: Iterable[Collection[int]]) -> None:
+        self.joins: Entries = {}
+        """P, by places of states."""
+        self.reactions: Entries = {}
+        """R, by branch and place of a state."""
+        rates, through = [*rows.rates], dict(rows.through)
+        for group in map(sorted, groups):
+            for place in group:
+                rates[place] = _product(self.joins, "joins", place, group, rows.rates)
+            for law, places in laws:
+                if not places.isdisjoint(group):
+                    through[law] += _product(self.reactions, "reaction", law, group, rows.rates)
+        self.symbols = (*self.joins.values(), *self.reactions.values())
+        """Parameters of the rows behind those of the network."""
+        parameters = (*rows.parameters, *self.symbols)
+        self.rows = replace(rows, parameters=parameters, rates=tuple(rates), through=through)
+
+
+def _product(entries: Entries, name: str, row: int, columns: Iterable[int], rates: Sequence[Expr]) -> Expr:
+    for column in columns:
+        entries[row, column] = Symbol(f"{name} {row} {column}", real=True)
+    return Add(*(entries[row, column] * rates[column] for column in columns))
+
+
+def held_places(form: StateForm, link: int) -> set[int]:
+    """Places of the states of speed that a link connects."""
+    members = {*form.tree.loops.get(link, ()), *form.tree.cutsets.get(link, ())}
+    return {place for place, tree in enumerate(form.across_states) if tree in members}
+
+
+def groups(form: StateForm, laws: Iterable[int], others: Iterable[Collection[int]]) -> list[set[int]] | None:
+    """The states that laws connect, or None where rows are not the place for what holds.
+
+    They are where no element rests because others hold both of its ends: as a rule, each holds inertias of its own. Who
+    carries would be another question, which an assembly of its own answers.
+
+    Args:
+        form: of the equations in which nothing holds.
+        laws: branches of what may hold.
+        others: places of states between which something else may become rigid.
+    """
+    graph = nx.Graph()
+    for link in laws:
+        places = held_places(form, link)
+        ends = (*places, FRAME)[:2]
+        if not 0 < len(places) <= 2 or graph.has_edge(*ends):
+            return None
+        graph.add_edge(*ends)
+    sets = [set(group) for group in nx.connected_components(graph.subgraph([n for n in graph if n != FRAME]))]
+    rigid = (*others, *(held_places(form, link) for link in form.dependent_across))
+    taken = set[int]().union(*rigid)
+    if not nx.is_forest(graph) or any(len(group) > LARGEST_GROUP or not taken.isdisjoint(group) for group in sets):
+        return None
+    return sets
 
 
 class Joints:
@@ -67,16 +146,6 @@ class Joints:
     def alike(self, x: Array) -> Array:
         """States or rates in which what is held follows the others to the last bit."""
         return self._alike @ x
-
-    def read(self, by_state: Any, by_input: Any, part: LinearPart) -> tuple[Factor, Factor]:
-        """What reads states and inputs (q, n) and (q, m), of scipy.sparse, with the reactions among the inputs.
-
-        It reads the inputs without the laws of what holds.
-        """
-        react = by_input[:, self.places] @ self._reactions.sparse
-        return Factor(by_state @ self._alike.sparse + react @ part.A @ self._alike.sparse), Factor(
-            by_input + react @ part.B
-        )
 
     def entries(self, rows: HeldRows) -> Array:
         """(k,) the numbers of the symbols in rows: those of P and of R."""
@@ -173,12 +242,6 @@ class HeldArrays(BoundArrays):
     def rates(self, t: Any, x: Array, y: Array, u: Array) -> Array:
         """x', in which what is held moves as one."""
         return self.joints.alike(super().rates(t, x, y, u))
-
-    def others(self, t: Any, x: Array) -> Array:
-        """Inputs u without those of what holds."""
-        u = self._moving.values(t, x)[1]
-        u[self.joints.places] = 0.0
-        return u
 
     def rhs(self, t: Any, x: Array) -> Array:
         """x' at time t."""

@@ -30,8 +30,7 @@ from shaftwork.core.kept import Kept
 from shaftwork.formulation.explicit_rows import Rows
 from shaftwork.formulation.form import Names
 from shaftwork.formulation.observables import NamedReadings, Observables
-from shaftwork.hybrid.modes.mode_guards import ModeGuards
-from shaftwork.hybrid.modes.mode_machines import ModeMachine, ModeNames
+from shaftwork.hybrid.modes.mode_machines import ModeGuards, ModeMachine, ModeNames
 from shaftwork.hybrid.starts import ElementReadings
 from shaftwork.integrate.engines import available
 from shaftwork.integrate.problem import Guards, Problem
@@ -94,7 +93,6 @@ class ModeEquations:
         self._matrices = Kept[LinearPart, ReadingMatrices](KEPT)
         self._rates_by_p = Kept[bytes, tuple[RightSide, dict[str, Any]]](KEPT)
         self._guards_by_p = Kept[bytes, GuardValues](KEPT)
-        self._problems = Kept[tuple[ModeNames, bytes], Problem](KEPT)
         self._translated = Kept[tuple[int, Expr], Expr](KEPT)
         self._numbers = [self._places[element.number] for element in elements if element.number in self._places]
 
@@ -213,9 +211,6 @@ class ModeEquations:
 
     def problem(self, modes: ModeNames, p: Array) -> Problem:
         """What is the same in all phases of these modes; the rest is empty."""
-        return self._problems((modes, p.tobytes()), lambda: self._problem(modes, p))
-
-    def _problem(self, modes: ModeNames, p: Array) -> Problem:
         bound, (_, notes), clocks, size = partial(self.bound, p), self._rates(p), self.clocks, len(self.model.states)
         guards, none = self.guards(p), np.empty(0)
         values = guards if not clocks else lambda t, y: guards(t, y[:, :size])

@@ -1,16 +1,29 @@
-"""What changes its mode in a network: elements, their modes, and the guards that end these."""
+"""What changes its mode in a network: elements, their modes, and the guards that end these.
+
+What slips by its mode may not move at all, as others hold both of its ends: of two frictions on one shaft one rests.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 
 import numpy as np
+from sympy import Expr, Integer, Symbol
 
 from shaftwork.codegen.array_form.elements import Array
-from shaftwork.components.modes import Leave, Modes
-from shaftwork.network.graph import CircuitGraph, GraphPart
+from shaftwork.components.branches import ACROSS, End
+from shaftwork.components.modes import Leave, Mode, ModeChoice, Modes
+from shaftwork.core.errors import CompileError
+from shaftwork.formulation.form import StateForm
+from shaftwork.formulation.gains import Number, add, value_of
+from shaftwork.formulation.observables import Observables
+from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart
+from shaftwork.network.kinds import Kind
+from shaftwork.network.netlist import Netlist
 
 NO_IMPACT = 1e-8
 """A speed across what is joined, as part of the largest one or of one, up to which it is an error of the run."""
@@ -133,3 +146,157 @@ class ActiveGuard:
     guard: int
     side: float
     leave: Leave
+
+
+def at_rest(netlist: Netlist, form: StateForm) -> Netlist:
+    """The network with the laws of rest for what cannot move; the same one where there are none.
+
+    Args:
+        netlist: of the network, with a form chosen for each element.
+        form: of the same network.
+    """
+    parts = {part.name: part for part in form.graph.parts}
+    resting: dict[str, tuple[ModeChoice, ...]] = {}
+    for item in netlist.placed:
+        part = parts[item.part.name]
+        pairs = zip(part.modes, item.choices, strict=False)  # nothing is chosen for what has no modes
+        choices = tuple(_choice_at_rest(form, part, element, choice) for element, choice in pairs)
+        if choices != item.choices:
+            resting[part.name] = choices
+    return netlist.with_choices(resting) if resting else netlist
+
+
+def _choice_at_rest(form: StateForm, part: GraphPart, element: Modes, choice: ModeChoice) -> ModeChoice:
+    """What is chosen for an element, in the form of rest where it has one and is at rest."""
+    forms = (mode.at_rest for mode in element.options if mode.form == choice.form and mode.at_rest is not None)
+    other = next(forms, None)
+    return replace(choice, form=other) if other is not None and rests(form, part, element) else choice
+
+
+def rests(form: StateForm, part: GraphPart, element: Modes) -> bool:
+    """Whether no branch of the tree but rigid joints is on the way from one end of an element to the other."""
+    return joints_across(form, part, element) is not None
+
+
+def joints_across(form: StateForm, part: GraphPart, element: Modes) -> Mapping[int, float] | None:
+    """The rigid joints on the way from one end of an element to the other, by branch, with the speed across the element
+    for one across each of them; None where other branches of the tree are on it.
+    """
+    first, second = (_potential(form, part, end) for end in part.ends_of(element))
+    if first is None or second is None:
+        return None
+    path = {tree: add(first.get(tree, 0), -second.get(tree, 0), []) for tree in dict.fromkeys(chain(first, second))}
+    joints = {tree: value_of(share) for tree, share in path.items() if share != 0}
+    rigid = all(form.graph.branches[tree].template.kind is Kind.COUPLING for tree in joints)
+    return joints if rigid else None
+
+
+def holds_at_rest(form: StateForm, part: GraphPart, element: Modes) -> tuple[int, float] | None:
+    """The branch of the friction that alone holds an element at rest, and the sign of its speed for the element's.
+
+    None where nothing does, or another part that has modes, or several.
+    """
+    joints = joints_across(form, part, element) or {}
+    holders = {branch: share for branch, share in joints.items() if form.graph.part_of(branch).modes}
+    if len(holders) != 1:
+        return None
+    ((branch, share),) = holders.items()
+    rubs = any(len(mode.gives_way) > 1 for modes in form.graph.part_of(branch).modes for mode in modes.options)
+    return (branch, math.copysign(1.0, share)) if rubs else None
+
+
+def _potential(form: StateForm, part: GraphPart, end: End) -> Mapping[int, Number] | None:
+    node = part.node_at(end)
+    return {} if node == GROUND else form.tree.potentials[node]
+
+
+class ModeGuards:
+    """The guards of all modes.
+
+    Args:
+        form: of the equations.
+        elements: of the network.
+        forms: of each element; None for one of which all are in these equations.
+        readings: of the same.
+    """
+
+    def __init__(
+        self, form: StateForm, elements: Sequence[ModeMachine], forms: Sequence[str | None], readings: Observables
+    ) -> None:
+        self._form, self._elements, self._readings = form, elements, readings
+        self._parts = {part.name: part for part in form.graph.parts}
+        self.expressions: list[Expr] = []
+        """Each guard once."""
+        self.resting = {k for k, e in enumerate(elements) if rests(form, self._parts[e.part.name], e.modes)}
+        """Elements of which others hold both ends."""
+        self._places: dict[tuple[int, Expr], int] = {}
+        self._leaves: dict[tuple[int, str], tuple[ActiveGuard, ...]] = {}
+        for number, element in enumerate(elements):
+            part = self._parts[element.part.name]
+            for mode in element.modes.options:
+                if forms[number] in (None, mode.form):
+                    holds = forms[number] is None and element.joins(mode.name)
+                    still = {ACROSS: Integer(0)} if holds or number in self.resting else {}
+                    self._leaves[number, mode.name] = tuple(self._leaving(number, part, mode, still))
+        self.owners = {active.guard: active.element for guards in self._leaves.values() for active in guards}
+        """The element of each guard."""
+        self._sides: dict[ModeNames, Array] = {}
+        self._ends: dict[ModeNames, tuple[ActiveGuard, ...]] = {}
+
+    def _leaving(self, number: int, part: GraphPart, mode: Mode, still: Mapping[Symbol, Expr]) -> Iterator[ActiveGuard]:
+        """The guards of a mode; what another mode of the element has is shared, with the other sign as well.
+
+        Args:
+            number: of the element.
+            part: of the element.
+            mode: of the element.
+            still: its speed where that is always zero: through gears it would be so but for rounding, which would tell
+                which way a friction slips.
+        """
+        taken: list[int] = []
+        element = self._elements[number].modes
+        for leave in mode.leaves:
+            try:
+                when = self._readings.guard(part, element, leave.when.xreplace(still))
+                if still and leave.by_speed:
+                    # what has given way at rest holds again before the one that holds it is pressed the other way
+                    when = leave.when.xreplace({ACROSS: self._holding(part, element)})
+            except ValueError as error:  # sympy's, of a minimum or maximum of what is infinite
+                raise CompileError(
+                    f"A law of '{self._elements[number].name}' has no finite value at zero speed, where it is "
+                    f"{mode.words}. Take one that has, as 1 / (0.1 + omega**2) has for 1 / omega**2."
+                ) from error
+            for side, expression in ((1.0, when), (-1.0, -when)):
+                place = self._places.get((number, expression))
+                if place is not None and place not in taken:
+                    active = ActiveGuard(number, place, side, leave)
+                    break
+            else:
+                self.expressions.append(when)
+                active = ActiveGuard(number, len(self.expressions) - 1, 1.0, leave)
+                self._places.setdefault((number, when), active.guard)
+            taken.append(active.guard)
+            yield active
+
+    def _holding(self, part: GraphPart, element: Modes) -> Expr:
+        """The torque of the one friction that holds an element at rest, with the sign that its own would have."""
+        holder = holds_at_rest(self._form, part, element)
+        if holder is None:
+            return Integer(0)
+        branch, sign = holder
+        return int(sign) * self._readings.through(branch)
+
+    def watched(self, modes: ModeNames) -> tuple[ActiveGuard, ...]:
+        """Everything that may end one of the modes."""
+        if modes not in self._ends:
+            self._ends[modes] = tuple(active for pair in enumerate(modes) for active in self._leaves[pair])
+        return self._ends[modes]
+
+    def sides(self, modes: ModeNames) -> Array:
+        """(guards,) the side of each guard that ends one of the modes."""
+        if modes not in self._sides:
+            sides = np.zeros(len(self.expressions))
+            for active in self.watched(modes):
+                sides[active.guard] = active.side
+            self._sides[modes] = sides
+        return self._sides[modes]

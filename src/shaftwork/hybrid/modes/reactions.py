@@ -12,7 +12,6 @@ from copy import copy
 from dataclasses import replace
 from functools import cached_property, partial
 from itertools import chain
-from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -21,14 +20,12 @@ from sympy import Float
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.array_form.linear_readings import ReadingMatrices
 from shaftwork.codegen.array_form.matrices import LinearPart
-from shaftwork.codegen.array_form.products import Factor
 from shaftwork.codegen.compiled_model import ScalarProgram
 from shaftwork.components.discontinuities import parts
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.kept import Kept
 from shaftwork.formulation.form import StateForm
-from shaftwork.hybrid.modes.held_rows import HeldRows, groups, held_places
-from shaftwork.hybrid.modes.joints import HeldArrays, HeldStores, Joints
+from shaftwork.hybrid.modes.joints import HeldArrays, HeldRows, HeldStores, Joints, groups, held_places
 from shaftwork.hybrid.modes.mode_equations import ModeEquations, RightSide
 from shaftwork.hybrid.modes.mode_machines import ModeMachine, ModeNames, is_same
 from shaftwork.integrate.problem import Problem
@@ -61,7 +58,6 @@ class ReactionEquations(ModeEquations):
         joining = (element.number for element, law in zip(elements, laws, strict=True) if law is not None)
         self._joining = [self._places[number] for number in joining if number in self._places]
         self._joints: tuple[LinearPart, Joints] | None = None
-        self._factors: tuple[LinearPart, Factor, Factor] | None = None
         self._notes: dict[bytes, dict[str, Any]] = {}
         self._holds: tuple[Joints, Array] | None = None
         _ = self._many, self.clocks  # made once for all
@@ -69,9 +65,9 @@ class ReactionEquations(ModeEquations):
     def holding(self, numbers: tuple[int, ...]) -> ReactionEquations:
         """The equations in which the elements of these numbers hold."""
         other = copy(self)
-        caches: dict[str, Any] = {name: Kept(KEPT_RATES) for name in ("_guards_by_p", "_rates_by_p", "_problems")}
+        caches: dict[str, Any] = {name: Kept(KEPT_RATES) for name in ("_guards_by_p", "_rates_by_p")}
         laws = [law for k in numbers if (law := self._laws[k]) is not None]
-        vars(other).update(_held=laws, _joints=None, _factors=None, _holds=None, **caches)
+        vars(other).update(_held=laws, _joints=None, _holds=None, **caches)
         return other
 
     def holds_by_numbers(self, number: int) -> bool:
@@ -124,28 +120,9 @@ class ReactionEquations(ModeEquations):
         return replace(problem, jacobian=self.slopes(partial(self.prepared(p).bound.with_laws, p)))
 
     def _reading(self, bound: HeldArrays, matrices: ReadingMatrices) -> Callable[[Array, Array], Array]:
-        """What guards are made of; in two products where there are no rates in it, as it is asked for most of all."""
+        """What guards are made of; rounding gives no speed to what holds."""
         exact = super()._reading(bound, matrices)
-
-        def slow(times: Array, states: Array) -> Array:
-            return exact(times, bound.joints.alike(states.T).T)  # rounding gives no speed to what holds
-
-        if matrices.plain is None or bound.part.B1.nnz:
-            return slow
-        if self._factors is None or self._factors[0] is not bound.part:
-            self._factors = bound.part, *bound.joints.read(*matrices.plain, bound.part)
-        _, by_state, by_input = self._factors
-
-        def quick(times: Array, states: Array) -> Array:
-            one = len(times) == 1
-            x = states[0] if one else states.T
-            u = bound.others(times[0] if one else times, x)
-            if not isfinite(np.vdot(u, u)):
-                return slow(times, states)  # which says what has no value
-            read = by_state @ x + by_input @ u
-            return read[:, None] if one else read
-
-        return quick
+        return lambda times, states: exact(times, bound.joints.alike(states.T).T)
 
     def bound(self, p: Array) -> HeldArrays:
         """The equations with their parameters."""

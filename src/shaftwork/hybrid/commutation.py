@@ -10,10 +10,9 @@ from sympy import Expr
 
 from shaftwork.components.branches import ACROSS, THROUGH
 from shaftwork.core.errors import NetworkError
-from shaftwork.hybrid.hybrid_state import Change, HybridState, Transition
-from shaftwork.hybrid.modes.exceeded_guards import exceeded
+from shaftwork.hybrid.hybrid_state import Change, HybridState, Transition, exceeded
 from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, ModeMachine, ModeNames, with_modes
-from shaftwork.hybrid.regimes import Regimes, anew
+from shaftwork.hybrid.phases import Regimes, anew
 
 MOST = 500
 """So many sets of diodes are tried at one instant, the smallest first: all of a circuit with eight of them."""
@@ -32,7 +31,7 @@ class Commutation:
     def commutated(self, moment: HybridState, t: float, modes: ModeNames) -> tuple[HybridState, dict[int, str]]:
         """The modes that are wanted, and what then takes over a torque or current that they would cut off."""
         plain = self._regimes.changed(moment, t, modes)
-        names = plain.regime.assembly.stores.through
+        names = plain.regime.stores.through
         if plain.x is not moment.x and names and not self._keeps(t, moment, plain, names):
             for other, changed in self._keeping(t, moment, modes, takeovers(self._elements, modes), names):
                 if not exceeded(other, t, other)[1]:
@@ -52,7 +51,7 @@ class Commutation:
             met = active.leave.by_time and active.side * now[active.guard] >= -(bands[active.guard] if bands else 0.0)
             if k not in changed and met and self._elements[k].is_switch:
                 changed[k] = active.leave.to or anew(moment, after, k)
-        new_modes, names = with_modes(modes, changed), moment.regime.assembly.stores.names
+        new_modes, names = with_modes(modes, changed), moment.regime.stores.names
         # diodes that begin to conduct, and those that no longer do
         options = [*_led(self._elements, new_modes, ACROSS), *_led(self._elements, new_modes, -THROUGH)]
         for new, led in self._keeping(after, moment, new_modes, _sets(options, 0), names):
@@ -83,8 +82,8 @@ class Commutation:
         """Whether what is stored under some names, torques or speeds, is the same in other modes."""
         if other.x is moment.x:
             return True
-        before, after = self._regimes.stored(moment, t), self._regimes.stored(other, t)
-        through = moment.regime.assembly.stores.through
+        before, after = moment.stored(t), other.stored(t)
+        through = moment.regime.stores.through
         for kind in ([name for name in names if name in through], [name for name in names if name not in through]):
             least = NO_IMPACT * sum(abs(before[name]) for name in kind)
             if sum(abs(after[name] - before[name]) for name in kind) > least:
