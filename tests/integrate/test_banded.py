@@ -15,8 +15,7 @@ import shaftwork as sw
 from shaftwork.core.errors import ParameterError, SimulationError
 from shaftwork.integrate import choice, scipy_ivp
 from shaftwork.integrate.collocation import banded
-from shaftwork.integrate.collocation.banded_method import shifted_collocation
-from shaftwork.integrate.collocation.banded_stages import ShiftedMatrix
+from shaftwork.integrate.collocation.banded_stages import ShiftedMatrix, shifted_collocation
 from shaftwork.integrate.linear import propagation
 from shaftwork.integrate.problem import LinearInputs, Problem
 

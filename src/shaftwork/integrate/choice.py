@@ -130,7 +130,7 @@ def no_series(failed: SeriesError, name: str) -> str:
 
 def _guarded(problem: Problem, trajectory: Trajectory, name: str) -> Trajectory:
     """The run, with what makes it worth less than it should be."""
-    from shaftwork.integrate.linear.cancellation import spoiled
+    from shaftwork.integrate.linear.rounding_errors import spoiled
     from shaftwork.integrate.linear.verification import objection
 
     said = objection(problem, trajectory, name)

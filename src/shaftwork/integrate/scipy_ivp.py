@@ -13,7 +13,7 @@ from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.crossings import Crossings
 from shaftwork.integrate.engines import ENGINES
 from shaftwork.integrate.guards import LEAST, SHORTER, GuardWatch
-from shaftwork.integrate.linear.cancellation import cancellation
+from shaftwork.integrate.linear.rounding_errors import cancellation
 from shaftwork.integrate.problem import Array, Problem, Trajectory, tightened
 from shaftwork.integrate.smooth_intervals import (
     GuardedFunctions,

@@ -123,8 +123,7 @@ class Inputs:
             last = p, {}
         if x.ndim not in last[1]:
             last[1][x.ndim] = tuple(
-                tuple(row[:, None] if x.ndim > 1 else row for row in p[group.branches.places])
-                for group in self._groups
+                tuple(row[:, None] if x.ndim > 1 else row for row in p[group.branches.places]) for group in self._groups
             )
             if not p.flags.writeable:
                 self._last = last

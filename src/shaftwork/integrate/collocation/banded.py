@@ -14,8 +14,12 @@ from typing import Any
 import numpy as np
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.integrate.collocation.banded_method import ShiftedCollocation, shifted_collocation
-from shaftwork.integrate.collocation.banded_stages import BandedStages, StepStart
+from shaftwork.integrate.collocation.banded_stages import (
+    BandedStages,
+    ShiftedCollocation,
+    StepStart,
+    shifted_collocation,
+)
 from shaftwork.integrate.crossings import Crossings
 from shaftwork.integrate.engines import ENGINES
 from shaftwork.integrate.problem import Array, Problem, Trajectory

@@ -11,9 +11,17 @@ from itertools import pairwise
 import numpy as np
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.integrate.linear.linear_system import LinearSystem, are_even, propagator_of, straight_line, system_of
-from shaftwork.integrate.linear.modal import FEWEST, MOST_VALUES, driven, polynomials
-from shaftwork.integrate.linear.observation import difference, doubt
+from shaftwork.integrate.linear.linear_system import (
+    FEWEST,
+    MOST_VALUES,
+    LinearSystem,
+    are_even,
+    driven,
+    polynomials,
+    propagator_of,
+    straight_line,
+    system_of,
+)
 from shaftwork.integrate.linear.precise import (
     Nearby,
     PrecisePiece,
@@ -22,6 +30,7 @@ from shaftwork.integrate.linear.precise import (
     precise_system,
     seconds,
 )
+from shaftwork.integrate.linear.rounding_errors import difference, doubt
 from shaftwork.integrate.problem import Array, LinearInputs, Problem, Trajectory
 from shaftwork.integrate.smooth_intervals import SmoothInterval, both_sides, failure, pieces, piecewise, start_of_piece
 

@@ -8,8 +8,7 @@ import numpy as np
 
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.linear import propagation
-from shaftwork.integrate.linear.cancellation import REMEDY
-from shaftwork.integrate.linear.observation import largest_part, outlook, rounding, samples
+from shaftwork.integrate.linear.rounding_errors import REMEDY, largest_part, outlook, rounding, samples
 from shaftwork.integrate.problem import TOLERATED, UNSURPRISING, Array, Observed, Problem, Trajectory
 
 # Rounding is worth saying from this part of the largest value of its kind. It is an estimate, no
