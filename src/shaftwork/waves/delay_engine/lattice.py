@@ -13,9 +13,18 @@ from numpy.typing import NDArray
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.problem import Array
 from shaftwork.integrate.smooth_intervals import SmoothInterval, failure, pieces, start_of_piece
-from shaftwork.waves.delay_engine.collocation import GAUSS, POWERS, STAGES, STATE_POWERS, WEIGHTS, values_at
+from shaftwork.waves.delay_engine.collocation import (
+    GAUSS,
+    POWERS,
+    RESOLVED,
+    STAGES,
+    STATE_POWERS,
+    WEIGHTS,
+    Scales,
+    left_out,
+    values_at,
+)
 from shaftwork.waves.delay_engine.lines import DelayProblem, DelayTrajectory, Past, past_of
-from shaftwork.waves.delay_engine.scales import RESOLVED, Scales, left_out
 from shaftwork.waves.delay_engine.waveforms import WavePanels, trajectory
 
 # Numbers of panels.
