@@ -24,6 +24,7 @@ from shaftwork.integrate.problem import Array, LinearInputs, Problem
 from shaftwork.integrate.smooth_intervals import SmoothInterval
 from shaftwork.integrate.stiffness import balance, norm, scale_by
 from shaftwork.numerics.polynomials import chebyshev_nodes, to_chebyshev, to_powers
+from shaftwork.numerics.tolerances import SAME
 
 Complex = NDArray[np.complex128]
 
@@ -31,8 +32,6 @@ Complex = NDArray[np.complex128]
 LARGEST_CONDITION = 1e4
 # Up to this size of their argument the phi functions are summed as series of so many terms.
 NEAR, SERIES_TERMS = 2.0, 24
-# In the scale of energy a lossless matrix is skew up to this part of its entries: each state on the way there rounds.
-SKEW = 1e-12
 # Degree of a panel's polynomials, the part of an input that they may leave out, and that which rounding may take.
 DEGREE, LEFT_OUT, ROUNDED = 8, 1e-13, 1e-10
 # Panels of a run at least: where an input is nothing but for short blows, fewer nodes may all lie between these.
@@ -46,8 +45,8 @@ _CHEBYSHEV = to_chebyshev(chebyshev_nodes(DEGREE))
 _FACTORIALS = np.cumprod([1.0, *range(1, DEGREE + 1)])
 # Values at a time in one evaluation of the motion: the functions phi of so many stay in a cache.
 BLOCK = 10_000
-# From so many states on LAPACK may take so long for the modes that Ctrl-C must not wait for it.
-LONG_WAIT = 100
+# Intervals of a grid of an engine's own, or of outputs that are looked at: no accuracy depends on it.
+OWN_INTERVALS = 500
 # A forcing may differ from a straight line by this part of its size before it is refused.
 STRAIGHT = 1e-7
 
@@ -120,7 +119,7 @@ def _lossless_halves(matrix: Array) -> tuple[Array, NDArray[np.bool_]] | None:
             speeds[neighbours], reached[neighbours] = not speeds[i], True
             waiting.extend(neighbours.tolist())
     scaled = matrix * scale / scale[:, None]
-    if (np.abs(scaled + scaled.T) > SKEW * np.abs(scaled)).any() or scaled[np.equal.outer(speeds, speeds)].any():
+    if (np.abs(scaled + scaled.T) > SAME * np.abs(scaled)).any() or scaled[np.equal.outer(speeds, speeds)].any():
         return None
     return scale, speeds
 
@@ -283,8 +282,7 @@ class LinearSystem:
     @cached_property
     def modes(self) -> Eigensystem | None:
         """The modes, or None where they are too badly conditioned."""
-        matrix = self.matrix.toarray()
-        return interruptible(find_modes, matrix) if len(matrix) >= LONG_WAIT else find_modes(matrix)
+        return interruptible(find_modes, self.matrix.toarray())
 
 
 def system_of(linear: LinearInputs) -> LinearSystem:

@@ -13,14 +13,17 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
+from shaftwork.integrate.linear.linear_system import OWN_INTERVALS
 from shaftwork.integrate.problem import Array, Observed, Problem, Trajectory
 from shaftwork.integrate.stiffness import LARGEST_EIGENVALUES, balance, scale_by
 
 # So many states of a run tell what its dampers take; so many outputs are looked at, evenly and ever denser towards its
 # start.
 SAMPLES = 12
-# So many outputs tell how large the values of each kind become.
-OUTLOOK = 500
+# From this part of the largest value of its kind on rounding is worth saying, and a run in whole numbers worth making.
+# It is an estimate, no bound: with it none of 1771 random networks, parameters from 1e-12 to 1e12, is off by 1e-6
+# without a word.
+WORTH_SAYING = 2e-7
 # A motion each of whose states is known to this part is not looked at any further.
 CERTAIN = 1e-10
 # Where torques may be off by this part because of the rounding of speeds, a run says so. Of a linear network less is
@@ -173,7 +176,7 @@ def _patterns(n: int) -> Array:
 
 def outlook(observed: Observed, trajectory: Trajectory) -> Array:
     """(k, m) values at so many outputs that the largest of each kind is hardly missed."""
-    chosen = np.unique(np.linspace(0, trajectory.t.size - 1, OUTLOOK).round().astype(int))
+    chosen = np.unique(np.linspace(0, trajectory.t.size - 1, OWN_INTERVALS).round().astype(int))
     return observed.values(trajectory.t[chosen], trajectory.x[chosen])
 
 

@@ -17,8 +17,9 @@ from shaftwork.core.notices import warn
 from shaftwork.integrate.engines import WAVE
 from shaftwork.integrate.problem import Array
 from shaftwork.integrate.smooth_intervals import pieces
+from shaftwork.numerics.tolerances import SAME
 from shaftwork.waves.delay_engine.collocation import POWERS, STAGES, STATE_POWERS, squared
-from shaftwork.waves.delay_engine.lattice import ROUNDING, Lattice, LatticeRun, Matrices, Numbers, panel_map
+from shaftwork.waves.delay_engine.lattice import Lattice, LatticeRun, Matrices, Numbers, panel_map
 from shaftwork.waves.delay_engine.lines import DelayProblem, DelayTrajectory
 from shaftwork.waves.delay_engine.march import March
 from shaftwork.waves.delay_engine.waveforms import one_sided, trajectory
@@ -157,7 +158,7 @@ def _measure(problem: DelayProblem) -> tuple[float, tuple[int, ...]] | None:
     for parts in range(1, MOST_PARTS + 1):
         ratios = problem.delays * parts / shortest
         multiples = np.round(ratios)
-        if (np.abs(ratios - multiples) <= ROUNDING * multiples).all() and multiples.max() <= MOST_PERIODS:
+        if (np.abs(ratios - multiples) <= SAME * multiples).all() and multiples.max() <= MOST_PERIODS:
             return (shortest / parts, tuple(multiples.astype(int).tolist())) if size <= MOST_ROWS else None
     return None
 
@@ -165,7 +166,7 @@ def _measure(problem: DelayProblem) -> tuple[float, tuple[int, ...]] | None:
 def _first_pattern(problem: DelayProblem, period: float) -> tuple[float, ...]:
     marks = [*problem.breakpoints] if problem.steady else [*problem.breakpoints, problem.t_end]
     offsets = [0.0]
-    near = 8 * math.ulp(max(abs(problem.t0), abs(problem.t_end))) / period + ROUNDING
+    near = 8 * math.ulp(max(abs(problem.t0), abs(problem.t_end))) / period + SAME
     for mark in marks:
         offset = math.fmod((mark - problem.t0) / period, 1.0)
         if all(near < abs(offset - other) < 1 - near for other in offsets):
