@@ -15,8 +15,7 @@ import shaftwork as sw
 from shaftwork.core.errors import ParameterError, SimulationError
 from shaftwork.integrate import choice, scipy_ivp
 from shaftwork.integrate.collocation import banded
-from shaftwork.integrate.collocation.banded_matrix import ShiftedMatrix
-from shaftwork.integrate.collocation.banded_method import shifted_collocation
+from shaftwork.integrate.collocation.banded_stages import ShiftedMatrix, shifted_collocation
 from shaftwork.integrate.linear import propagation
 from shaftwork.integrate.problem import LinearInputs, Problem
 
@@ -166,15 +165,6 @@ def test_a_shifted_matrix_is_solved_whatever_its_graph(name):
         assert np.abs(residual).max() < 1e-13 * (abs(shift) * np.abs(solution).max() + np.abs(right).max()) * 100
 
 
-@pytest.mark.parametrize("name", ["path", "undamped path", "shuffled path"])
-def test_what_is_left_of_a_chain_of_springs_is_tridiagonal(name):
-    assert ShiftedMatrix(MATRICES[name]).bandwidth == 2
-
-
-def test_a_tree_of_many_arms_is_not_taken_for_a_chain():
-    assert not ShiftedMatrix(MATRICES["wide star"]).is_narrow
-
-
 def test_a_matrix_may_gain_and_lose_entries():
     first = MATRICES["path"]
     second = first.tolil()
@@ -188,7 +178,6 @@ def test_a_matrix_may_gain_and_lose_entries():
 
 @pytest.mark.parametrize("size", [2, 60])
 def test_a_singular_matrix_is_told(size):
-    # Two speeds are solved in a band, a full matrix by SuperLU.
     matrix = sparse.csc_array(np.ones((size, size)))
     with pytest.raises(np.linalg.LinAlgError):
         ShiftedMatrix(matrix - sparse.eye_array(size)).factor(-1.0 + 0.0j)
@@ -224,7 +213,6 @@ def test_the_number_of_steps_does_not_grow_with_the_chain():
     # With a bandwidth that stays the same, the cost of a step is linear in the number of elements.
     steps = [banded.solve(shaft(m, rtol=1e-5)).statistics["steps"] for m in (100, 1000, 4000)]
     assert max(steps) < 1.1 * min(steps)
-    assert {ShiftedMatrix(chain_matrix(m)[0]).bandwidth for m in (100, 1000)} == {2}
 
 
 def energy(x, inertias, stiffness):

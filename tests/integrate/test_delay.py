@@ -13,8 +13,7 @@ from scipy.integrate import solve_ivp
 from shaftwork.core.errors import AccuracyWarning, SimulationError
 from shaftwork.waves.delay_engine import engine as delay
 from shaftwork.waves.delay_engine.collocation import POINTS
-from shaftwork.waves.delay_engine.lines import DelayProblem, Lines, Past
-from shaftwork.waves.delay_engine.wave_history import WaveHistory
+from shaftwork.waves.delay_engine.lines import DelayProblem, Lines, Past, WaveHistory
 
 # The steel shaft of Popenda (8)-(23): 1 m long, 20 mm thick.
 DENSITY, MODULUS = 7900.0, 77.5e9

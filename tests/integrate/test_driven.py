@@ -11,7 +11,7 @@ import sympy
 from scipy.special import ive
 
 import shaftwork as sw
-from shaftwork.integrate.linear.modal import phi
+from shaftwork.integrate.linear.linear_system import phi
 
 t = sw.t
 SMOOTH = [

@@ -12,7 +12,7 @@ from scipy import sparse
 
 import shaftwork as sw
 from shaftwork.integrate.linear import linear_system, propagation
-from shaftwork.integrate.linear.modal import find_modes
+from shaftwork.integrate.linear.linear_system import find_modes
 from shaftwork.integrate.linear.precise import FixedPoint
 from shaftwork.integrate.problem import LinearInputs, Problem
 

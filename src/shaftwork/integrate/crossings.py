@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from shaftwork.integrate.problem import Array, DaeProblem, Problem
 from shaftwork.integrate.smooth_intervals import SmoothInterval
+from shaftwork.numerics.tolerances import CLEARANCE
 from shaftwork.numerics.zeros import LOOKS, zero
 
 Dense = Callable[[Array], Array]
@@ -22,8 +23,6 @@ FOLLOWED = 3
 # A step ends past its switch, by so much that no state moves there by more than this part of its tolerance. One that
 # ends past it by less than the second part stands.
 PAST, BEARABLE = 0.01, 0.04
-# Clearance of a switch in rounding units of the time: no solver takes shorter steps.
-CLEARANCE = 32
 # After so many attempts to end a step at its switch the step is halved.
 ATTEMPTS = 4
 # A motion that passes the same switch so many times in a row within its tolerance rests there, until it leaves it by

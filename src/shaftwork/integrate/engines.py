@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import importlib.util
-import sys
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
+
+from shaftwork.numerics.tolerances import EPS
 
 EngineName = Literal["auto", "scipy", "scipy-radau", "heyoka", "sundials", "exact", "banded", "wave"]
 ENGINE_NAMES: tuple[EngineName, ...] = get_args(EngineName)
@@ -42,7 +43,6 @@ class EngineEntry:
 
 # Below these tolerances scipy's methods only warn, SUNDIALS refuses (near the rounding of numbers), the rounding in the
 # stage equations of the banded engine is larger, and so is that of coefficients of rounded numbers on a wave.
-EPS = sys.float_info.epsilon
 _SCIPY = EngineEntry("shaftwork.integrate.scipy_ivp:solve", "everything that is not stiff", finest=100 * EPS)
 WAVE = EngineEntry("shaftwork.waves.delay_engine.engine:solve", "travelling waves", finest=1e-12)
 """The engine of networks with waves, which no others can take."""

@@ -7,25 +7,20 @@ from collections.abc import Callable
 import numpy as np
 
 from shaftwork.integrate.crossings import FIRST, Dense, Look, tolerance
-from shaftwork.integrate.problem import Array, DaeProblem, Problem, TimedProblem
+from shaftwork.integrate.problem import TOLERATED, Array, DaeProblem, Problem, TimedProblem
 from shaftwork.numerics.polynomials import Interpolant, interpolation_times
+from shaftwork.numerics.tolerances import CLEARANCE
 from shaftwork.numerics.zeros import LOOKS, zero
 
 # What the tolerance moves a guard, as part of its course in a run of a few steps, may be no more.
 KNOWN, BRIEF = 1e-5, 100
 
-# No step is shorter than so many rounding units of the time.
-CLEARANCE = 8
 # A step that meets a guard is looked at in panels that are halved towards it, so many times; Gauss' nodes in each.
 PANELS, (NODES, WEIGHTS) = 14, np.polynomial.legendre.leggauss(4)
-# By so many tolerances what the equations say along it may differ from what it has found.
-APART = 100.0
 # One that does not is made again in so many steps, unless it is shorter than this part of the whole run.
 SHORTER, LEAST = 8, 1e-9
 # Degree of the polynomial of a guard between two looks, and how many rounding units beside its zero it is checked.
 DEGREE, BESIDE = 12, 8
-# Parts of the first stretch of a step at which it is looked at where a guard starts at its limit.
-NEARER = 0.5 ** np.arange(1, 41)
 
 
 class GuardWatch:
@@ -67,8 +62,6 @@ class GuardWatch:
             return None
         look.add(start + LOOKS * (end - start))
         self._refuse_none(look)
-        if (look.values[0] >= 0).any():  # what is above zero by rounding may fall and rise again ere the first look
-            look.add(start + NEARER * (look.times[1] - start))
         noise = np.maximum(look.values[0], 0.0) + self._offsets
         look.values[0] = np.minimum(look.values[0], 0.0)
         look.follow(every=True)
@@ -109,7 +102,7 @@ class GuardWatch:
         rates = self._rates(self._problem, np.clip(times, self._low, self._high), states)
         by_rates, by_step = (half * WEIGHTS).ravel() @ rates, dense(np.array([end]))[0] - x
         size = self._problem.rtol * np.abs(states).max(axis=0) + self._problem.atol
-        return bool((np.abs(by_rates - by_step) <= APART * size).all())
+        return bool((np.abs(by_rates - by_step) <= TOLERATED * size).all())
 
     @staticmethod
     def _rates(problem: Problem, times: Array, states: Array) -> Array:

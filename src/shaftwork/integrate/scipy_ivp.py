@@ -13,7 +13,7 @@ from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.crossings import Crossings
 from shaftwork.integrate.engines import ENGINES
 from shaftwork.integrate.guards import LEAST, SHORTER, GuardWatch
-from shaftwork.integrate.linear.cancellation import cancellation
+from shaftwork.integrate.linear.rounding_errors import cancellation
 from shaftwork.integrate.problem import Array, Problem, Trajectory, tightened
 from shaftwork.integrate.smooth_intervals import (
     GuardedFunctions,
@@ -27,7 +27,7 @@ from shaftwork.integrate.smooth_intervals import (
     start_of_piece,
     used_up,
 )
-from shaftwork.integrate.stiffness import bound_of_decay, jacobians, rates
+from shaftwork.integrate.stiffness import STABLE, bound_of_decay, jacobians, rates
 
 Method = Literal["DOP853", "Radau"]
 
@@ -38,10 +38,8 @@ FINEST = ENGINES["scipy"].finest
 # A run is made again where the torques of dampers may be off by more than the first factor times the tolerance. On the
 # edge of stability errors are some 50 times as large as the tolerance that is asked for, hence the second.
 BEARABLE, EDGE = 2.0, 50.0
-# DOP853 is stable up to about this product of step and decay rate. A longer step may well end right, because what is
-# left of the fast motion is tiny at its start, and yet be off inside by much more than the torque of a damper bears.
-STABLE = 6.0
-# With shorter ones it is far from that edge, and every fast motion has steps of its own.
+# With steps of a smaller product of length and decay rate it is far from that edge, and every fast motion has steps of
+# its own.
 INSIDE, BRIEF = 1.0, 100
 
 
@@ -81,6 +79,8 @@ def solve(problem: Problem, method: Method = "DOP853") -> Trajectory:
             share = max(1 / (EDGE * factor), FINEST / problem.rtol)
             tight = tightened(problem, share)
             decay = rates(jacobians(problem)).decay
+            # A longer step than is stable may well end right, because what is left of the fast motion is tiny at its
+            # start, and yet be off inside by much more than the torque of a damper bears.
             again = _march(tight, method, longest=STABLE / decay if decay > 0 else np.inf)
             runs = [replace(new, counts=_sums([new, old])) for new, old in zip(again, runs, strict=True)]
     starts = np.array([run.times[0] for run in runs])

@@ -14,9 +14,8 @@ from shaftwork.integrate.problem import Array, DaeProblem, Problem, TimedProblem
 
 # A run has stalled when so many steps together advance by less than so many times this part of the whole time.
 STALL_STEPS, STALL_SPAN = 2000, 1e-10
-# A burst of short steps may be brief; so many of them are none: at this part the run would take a thousand million.
-LONG_STEPS, LONG_SPAN = 100_000, 1e-9
-# Where the motion rests at a switch of a law, this part is enough: ten million such steps would make a run.
+# Where the motion rests at a switch of a law, this part is enough: ten million such steps would make a run. Where a law
+# is as the square root of the speed, such a run would not end otherwise.
 STUCK_SPAN = 1e-7
 # Where a run has failed its further course is looked at for laws without a value, over this part of the whole time.
 AHEAD = 1e-6 * 0.5 ** np.arange(30, -1, -1)
@@ -223,7 +222,7 @@ class Pace:
 
     def __init__(self, problem: TimedProblem) -> None:
         self._progress, self._duration = problem.progress, problem.t_end - problem.t0
-        self._since, self._steps = {STALL_STEPS: problem.t0, LONG_STEPS: problem.t0}, 0
+        self._since, self._steps = problem.t0, 0
 
     def objection(self, t: float, *, rests: bool = False) -> str | None:
         """After each step to a time t in s: the reason to give up, or None.
@@ -235,17 +234,13 @@ class Pace:
         if self._progress is not None:
             self._progress(t)
         self._steps += 1
-        for steps, share in ((STALL_STEPS, STUCK_SPAN if rests else STALL_SPAN), (LONG_STEPS, LONG_SPAN)):
-            if self._steps % steps == 0:
-                advance, self._since[steps] = t - self._since[steps], t
-                if advance < steps * share * self._duration:
-                    return self._stalled(steps, advance)
-        return None
-
-    @staticmethod
-    def _stalled(steps: int, advance: float) -> str:
+        if self._steps % STALL_STEPS:
+            return None
+        advance, self._since = t - self._since, t
+        if advance >= STALL_STEPS * (STUCK_SPAN if rests else STALL_SPAN) * self._duration:
+            return None
         return (
-            f"the last {steps} steps advanced by {advance:.2g} s only, as where the laws on both sides of a jump "
+            f"the last {STALL_STEPS} steps advanced by {advance:.2g} s only, as where the laws on both sides of a jump "
             "drive the motion back to it. Give such a law a smooth transition, tanh(omega / 0.01) in place of "
             "sign(omega)"
         )

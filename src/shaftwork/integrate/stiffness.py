@@ -17,6 +17,8 @@ from shaftwork.integrate.smooth_intervals import pieces
 LARGEST_EIGENVALUES = 200
 # A few starts of pieces are looked at, not all: every piece of a pulsed input looks alike.
 MOST_PIECES = 4
+# Explicit methods are stable up to about this product of step and decay rate.
+STABLE = 5.0
 
 
 @dataclass(frozen=True)

@@ -14,10 +14,10 @@ from scipy import sparse
 from shaftwork.core.calls import unprinted
 from shaftwork.core.notices import FILTERS
 from shaftwork.integrate.engines import ENGINES
-from shaftwork.integrate.guards import CLEARANCE
 from shaftwork.integrate.problem import Array, DaeProblem, Problem
 from shaftwork.integrate.smooth_intervals import GuardedFunctions, SmoothInterval, failure
 from shaftwork.numerics.polynomials import Interpolant, interpolation_times
+from shaftwork.numerics.tolerances import CLEARANCE
 
 Method = Literal["BDF", "Adams"]
 

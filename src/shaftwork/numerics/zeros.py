@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.numerics.polynomials import Array
+from shaftwork.numerics.tolerances import EPS
 
 LOOKS = np.array([0.004, 0.07, 0.19, 0.31, 0.42, 0.53, 0.61, 0.74, 0.83, 0.91, 0.996])
 """Shares of a step at which its inside is looked at: at no regular places, which a motion might share. The outermost
 tell where a function goes from the ends."""
-EPS = float(np.finfo(float).eps)
 Chosen = slice | NDArray[np.bool_]
 """Some of many functions."""
 

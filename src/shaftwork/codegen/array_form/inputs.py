@@ -89,7 +89,7 @@ class Inputs:
                 self.of_time[group.inputs], self.controlled[group.inputs] = False, True
         self.controls = np.flatnonzero(self.controlled)
         self.rates = np.array([output[reading] for reading in form.readings if reading.kind == "rate"], dtype=np.intp)
-        self._last: tuple[Array, tuple[tuple[Any, ...], ...]] = np.empty(0), ()
+        self._last: tuple[Array, dict[int, tuple[tuple[Any, ...], ...]]] = np.empty(0), {}
 
     def _group(self, alike: TemplateGroup, place: Any, output: Any, integral: Any) -> _TemplateInputs:
         template = alike.template
@@ -113,15 +113,21 @@ class Inputs:
             tuple(function(slope(law, symbol)) for symbol in (TIME, ACROSS, INTEGRAL, *reads)),
         )
 
-    def _parameters(self, p: Array) -> tuple[tuple[Any, ...], ...]:
-        """What the laws of each group read of parameters; of the last that nobody can change it is kept."""
+    def _parameters(self, p: Array, x: Array) -> tuple[tuple[Any, ...], ...]:
+        """What the laws of each group read of parameters, as columns beside states (n, k).
+
+        Of the last vector that nobody can change it is kept: to make columns takes as long as a law.
+        """
         last = self._last
-        if last[0] is p:
-            return last[1]
-        values = tuple(tuple(p[group.branches.places]) for group in self._groups)
-        if not p.flags.writeable:
-            self._last = p, values
-        return values
+        if last[0] is not p:
+            last = p, {}
+        if x.ndim not in last[1]:
+            last[1][x.ndim] = tuple(
+                tuple(row[:, None] if x.ndim > 1 else row for row in p[group.branches.places]) for group in self._groups
+            )
+            if not p.flags.writeable:
+                self._last = last
+        return last[1][x.ndim]
 
     def values(self, t: Any, y: Array, x: Array, p: Array) -> Array:
         """u (m,) at time t from outputs y and states x; with t (k,), y (outputs, k) and x (n, k) it is (m, k)."""
@@ -171,7 +177,7 @@ class Inputs:
     ) -> Iterator[tuple[Index, bool, Index, Function, tuple[Any, ...]]]:
         """Inputs, whether the slope is by states and no outputs, by which, the function of the slope, what it takes."""
         t = np.float64(t)
-        for group, parameters in zip(self._groups, self._parameters(p), strict=True):
+        for group, parameters in zip(self._groups, self._parameters(p, x), strict=True):
             if group.outputs.size or group.reads.size:
                 read = (t, *_read(group, y, x, parameters))
                 _, across, integral, *others = group.slopes
@@ -205,7 +211,7 @@ class Inputs:
         """
         rows: list[Array] = []
         with np.errstate(all="ignore"):
-            for group, parameters in zip(self._groups, self._parameters(p), strict=True):
+            for group, parameters in zip(self._groups, self._parameters(p, x), strict=True):
                 if not group.moving:
                     continue
                 read, free = _read(group, y, x, parameters), np.zeros((group.inputs.size, t.size))
@@ -223,7 +229,7 @@ class Inputs:
             x: (n,) states.
             p: parameter vector.
         """
-        for group, parameters in zip(self._groups, self._parameters(p), strict=True):
+        for group, parameters in zip(self._groups, self._parameters(p, x), strict=True):
             read = _read(group, y, x, parameters)
             for k, place in enumerate(group.inputs.tolist()):
                 point = [np.float64(t), *(np.float64(value if np.ndim(value) == 0 else value[k]) for value in read)]
@@ -237,7 +243,7 @@ class Inputs:
         result = np.zeros((self.size, *np.shape(x)[1:]))
         t = np.float64(t)  # of Python's floats the cube root of -1 is complex, and 1 / 0 an exception
         with np.errstate(all="ignore"):  # a law that has no value is NaN here; the engines say when and where
-            for group, parameters in zip(self._groups, self._parameters(p), strict=True):
+            for group, parameters in zip(self._groups, self._parameters(p, x), strict=True):
                 function = pick(group)
                 if group.arrives:
                     if function is group.value and group.integrals[-1] < len(x):
@@ -262,8 +268,6 @@ def _read(group: _TemplateInputs, y: Array, x: Array, parameters: tuple[Any, ...
     across = y[group.outputs] if group.outputs.size else 0.0
     is_there = group.integrals.size and group.integrals[-1] < len(x)  # not the waves, where none are given
     integral = x[group.integrals] if is_there else 0.0
-    if x.ndim > 1:
-        parameters = tuple(row[:, None] for row in parameters)
     if not len(group.reads):
         return (across, integral, *parameters)
     return (across, integral, *(y[places] for places in group.reads), *parameters)

@@ -1,18 +1,26 @@
-"""The stage equations of one collocation step: at once for a linear system, by Newton's method for any other."""
+"""Collocation with complex shifts, and its stage equations: at once where linear, else by Newton's method."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from functools import cached_property, lru_cache
+from typing import Any, Literal
 
 import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
 from scipy import sparse
+from scipy.sparse.linalg import splu
 
-from shaftwork.integrate.collocation.banded_matrix import ShiftedMatrix, Solver
-from shaftwork.integrate.collocation.banded_method import ShiftedCollocation
 from shaftwork.integrate.problem import Array, LinearInputs, Problem
 from shaftwork.integrate.smooth_intervals import GuardedFunctions, SmoothInterval
+from shaftwork.numerics.polynomials import legendre_integrals, radau_nodes, to_integrals, to_legendre
+
+Complex = NDArray[np.complex128]
+Family = Literal["radau", "gauss"]
+Solver = Callable[[Complex], Complex]
 
 MOST_ITERATIONS = 10
 # Newton's method ends at this part of the tolerance: the error estimate, a difference of slopes, amplifies the rest.
@@ -21,6 +29,185 @@ NEWTON_SHARE = 1e-3
 SLOW = 0.05
 # A polynomial is not continued further than this part of its step.
 REACH = 3.0
+# Elimination joins the neighbours of a state to each other; a hub of many arms is left in.
+MOST_NEIGHBOURS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class ShiftedCollocation:
+    """A polynomial u of degree s whose slope meets x' = f(t, x) at s nodes of the step.
+
+    Law: the stage increments Z of one step h solve (1/h) A^-1 Z = f(x + Z). With the eigenvectors T of A^-1 and Z = T W
+    this falls apart, for the linear part J of f, into (pole / h - J) W = T^-1 (f - J Z), one equation for each pole.
+    The poles are conjugate pairs, so p = s / 2 of them do. The "modes" (s, n) are the real parts of these W above
+    their imaginary parts.
+
+    Args:
+        nodes: (s,) inside [0, 1].
+        poles: (p,) eigenvalues of A^-1 with positive imaginary part.
+        to_modes: (s, s) the modes of values at the nodes, by the rows of T^-1.
+        turn: (s, s) the modes, each times its pole.
+        spread: (s, s) Legendre coefficients of h u' from the modes.
+        nodal: (s + 1,) Legendre coefficients of the polynomial that vanishes at the nodes and is 1 at the start.
+
+    Source: Hairer and Wanner, Solving Ordinary Differential Equations II, 1996, sections IV.5 and IV.8.
+    """
+
+    nodes: Array
+    poles: Complex
+    to_modes: Array
+    turn: Array
+    spread: Array
+    nodal: Array
+
+    @property
+    def order(self) -> int:
+        """Order of u inside the step; the ends of the steps are of about twice that."""
+        return self.nodes.size
+
+    def increments(self, theta: Any) -> Array:
+        """(k, s) what the modes add to the state at parts theta (k,) of the step."""
+        return legendre_integrals(self.spread, _centred(theta)) / 2
+
+    def slopes(self, theta: Any) -> Array:
+        """(k, s) the slope h u' from the modes at parts theta (k,) of the step."""
+        return np.asarray(legendre.legvander(_centred(theta), self.order - 1) @ self.spread)
+
+    def bump(self, theta: Any) -> Array:
+        """(k,) the shape of the leading error of u for a defect of 1 in h u' at the start of the step.
+
+        Added to u it gives one order more and, with Radau's nodes, a slope without jumps between the steps.
+        """
+        return legendre_integrals(self.nodal[:, None], _centred(theta))[:, 0] / 2
+
+    @cached_property
+    def quieting(self) -> complex:
+        """The weight w for which F(z) = Re(w / (pole - z)), of the first pole and a real z, is 1 + O(z^2), and O(1/z).
+
+        F(h J) takes stiff parts out of a vector and leaves what a step resolves.
+        """
+        pole = complex(self.poles[0])
+        first, second = 1 / pole, 1 / pole**2
+        return complex(*np.linalg.solve([[first.real, -first.imag], [second.real, -second.imag]], [1.0, 0.0]))
+
+    @cached_property
+    def peak(self) -> float:
+        """Largest value of `bump`, whose slope is zero at the nodes alone."""
+        return float(np.abs(self.bump(np.append(self.nodes, 1.0))).max())
+
+    @cached_property
+    def at_start(self) -> Array:
+        """(s,) the slope h u' from the modes at the start of the step."""
+        return np.asarray(self.slopes(0.0)[0])
+
+    @cached_property
+    def at_end(self) -> Array:
+        """(2, s) what the modes add to the state over the whole step, and the slope h u' at its end."""
+        return np.vstack([self.increments(1.0), self.slopes(1.0)])
+
+
+@lru_cache
+def shifted_collocation(family: Family, stages: int) -> ShiftedCollocation:
+    """The method of a family with an even number of stages.
+
+    Args:
+        family: "radau" (Radau IIA, order 2 s - 1): stiff motions are damped as they should be. "gauss" (order 2 s):
+            keeps the energy of an undamped linear motion, and damps nothing.
+        stages: s, even.
+    """
+    nodal = np.zeros(stages + 1)
+    nodal[stages] = 1.0
+    if family == "radau":
+        points, nodal[stages - 1] = radau_nodes(stages), -1.0
+    else:
+        points = legendre.leggauss(stages)[0]
+    poles, vectors = np.linalg.eig(np.linalg.inv(to_integrals(points) / 2))
+    upper = np.flatnonzero(poles.imag > 0)
+    rows, pole = np.linalg.inv(vectors)[upper], np.diag(poles[upper])
+    shapes = to_legendre(points) @ (vectors * poles)[:, upper]
+    return ShiftedCollocation(
+        nodes=(points + 1) / 2,
+        poles=poles[upper],
+        to_modes=np.vstack([rows.real, rows.imag]),
+        turn=np.block([[pole.real, -pole.imag], [pole.imag, pole.real]]),
+        spread=np.hstack([2 * shapes.real, -2 * shapes.imag]),
+        nodal=nodal / legendre.legval(-1.0, nodal),
+    )
+
+
+def _centred(theta: Any) -> Array:
+    return 2 * np.atleast_1d(np.asarray(theta, dtype=float)) - 1
+
+
+class ShiftedMatrix:
+    """gamma - J for one sparse J after another and any shifts gamma.
+
+    States that only integrate others (the torque of a spring, an angle) are eliminated: with J = [[A, B], [C, 0]] what
+    is left is gamma - A - B C / gamma, for a chain of springs a tridiagonal matrix of the speeds alone. That halves the
+    time of a long chain, which SuperLU factorises without fill.
+
+    Args:
+        matrix: J, scipy.sparse (n, n).
+    """
+
+    def __init__(self, matrix: Any) -> None:
+        self._pattern: tuple[Any, Any] | None = None
+        self.load(matrix)
+
+    def load(self, matrix: Any) -> None:
+        """Take another J (n, n) for the shifts to come."""
+        matrix = sparse.csr_array(matrix)
+        pattern = matrix.indptr, matrix.indices
+        if self._pattern is None or not all(map(np.array_equal, self._pattern, pattern)):
+            gone = _integrators(matrix)
+            self._pattern, self._rest, self._gone = pattern, np.flatnonzero(~gone), np.flatnonzero(gone)
+        upper, lower = matrix[self._rest], matrix[self._gone]
+        B, C, diagonal = upper[:, self._gone], lower[:, self._rest], np.arange(self._rest.size)
+        A, through = sparse.coo_array(upper[:, self._rest]), sparse.coo_array(B @ C)
+        # Real parts of A, imaginary parts of B C, and room for the shift: one pattern for all shifts.
+        values = np.concatenate([A.data, 1j * through.data, np.zeros(diagonal.size)])
+        rows, columns = (np.concatenate([*pair, diagonal]) for pair in ((A.row, through.row), (A.col, through.col)))
+        self._left = sparse.csc_matrix((values, (rows, columns)), shape=A.shape)
+        self._diagonal = self._left.indices == np.repeat(diagonal, np.diff(self._left.indptr))
+        # products with complex vectors would convert them each time
+        self._B, self._C = B.astype(complex), C.astype(complex)
+
+    def factor(self, shift: complex) -> Solver:
+        """Factorise shift - J; the solver takes and gives complex (n,).
+
+        Raises:
+            LinAlgError: the matrix is singular.
+        """
+        inverse, rest, gone, B, C = 1 / shift, self._rest, self._gone, self._B, self._C
+        left, both = self._left.copy(), self._left.data
+        left.data = -both.real - inverse * both.imag
+        left.data[self._diagonal] += shift
+        try:
+            inner = splu(left).solve
+        except RuntimeError as error:
+            raise np.linalg.LinAlgError(str(error)) from error
+
+        def solve(right: Complex) -> Complex:
+            second = right[gone]
+            solution = np.empty_like(right)
+            remaining = solution[rest] = inner(right[rest] + inverse * (B @ second))
+            solution[gone] = inverse * (second + C @ remaining)
+            return solution
+
+        return solve
+
+
+def _integrators(matrix: Any) -> Any:
+    """States (n,) without an entry of their own that do not read each other, those of few neighbours first."""
+    pattern = sparse.csr_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
+    both = sparse.csr_array(pattern + pattern.T)
+    neighbours = np.diff(both.indptr)
+    candidates = np.flatnonzero((both.diagonal() == 0) & (neighbours > 0) & (neighbours <= MOST_NEIGHBOURS))
+    starts, indices = both.indptr.tolist(), both.indices.tolist()
+    chosen = [False] * both.shape[0]
+    for state in candidates[np.argsort(neighbours[candidates], kind="stable")].tolist():
+        chosen[state] = not any(chosen[other] for other in indices[starts[state] : starts[state + 1]])
+    return np.array(chosen, dtype=bool)
 
 
 @dataclass(frozen=True)
@@ -40,24 +227,53 @@ class StepStart:
     scale: Array
 
 
-class BandedStages(Protocol):
-    """Solves the stage equations of one step after another."""
+class BandedStages:
+    """Solves the stage equations of x' = f(t, x), one step after another.
 
-    @property
-    def counts(self) -> dict[str, int]:
+    A linear system x' = A x + u(t) takes one solution for each pole. Any other takes simplified Newton iterations;
+    Jacobian and factors are kept while they serve.
+
+    Args:
+        problem: with a Jacobian, or linear.
+        matrix: the Jacobian (n, n) at the start.
+        method: the collocation method; of Radau's family, where the system is not linear.
+    """
+
+    def __init__(self, problem: Problem, matrix: Any, method: ShiftedCollocation) -> None:
+        self._problem, self._method, self._linear = problem, method, problem.straight
+        self._at_nodes = method.increments(method.nodes)
+        # What a forcing of 1, and of the part of the step that has passed, give to each pole.
+        self._of_level, self._of_slope = method.to_modes.sum(axis=1), method.to_modes @ method.nodes
+        self._matrix = _shifted(self._linear) if self._linear is not None else ShiftedMatrix(matrix)
+        self._jacobian, self._wanted = sparse.csr_array(matrix), False
+        self._factored, self._solvers = 0.0, list[Solver]()
+        self._guard: GuardedFunctions
+        self._last: tuple[float, float, Array] | None = None
+        self._contraction = 1.0
+        self.counts = {"rhs": 0, "jacobians": 0, "factorisations": 0}
         """What was done so far."""
 
     @property
     def noisy(self) -> bool:
         """Whether `rate` multiplies what is left of an iteration by the fastest decay; Radau's own slope does not."""
+        return self._linear is None
 
     def open(self, piece: SmoothInterval) -> None:
         """Begin a piece."""
+        self._guard = GuardedFunctions(self._problem, piece)
+        self._wanted, self._last = self._linear is None, None
+        if self._linear is not None:
+            self._since, self._level = piece.low, np.asarray(self._linear.forcing(piece.low))
+            self._slope = (np.asarray(self._linear.forcing(piece.high)) - self._level) / (piece.high - piece.low)
 
     def rate(self, t: float, x: Array) -> Array:
         """x' (n,)."""
+        if self._linear is not None:
+            return np.asarray(self._jacobian @ x + self._level + (t - self._since) * self._slope)
+        self.counts["rhs"] += 1
+        return self._guard.rhs(t, x)
 
-    def modes(self, start: StepStart, step: float, expected: Array | None = None, /) -> Array | None:
+    def modes(self, start: StepStart, step: float, expected: Array | None = None) -> Array | None:
         """The modes (s, n) of a step, or None where a shorter one is needed.
 
         Args:
@@ -68,141 +284,11 @@ class BandedStages(Protocol):
         Raises:
             LinAlgError: a matrix is singular.
         """
-
-    def quieted(self, defect: Array, step: float, scale: Array) -> Array:
-        """The defect (n,) of the last step, without its stiff parts where these exceed the tolerance (n,)."""
-
-    def reason(self, reason: str) -> str:
-        """The reason of a failure, with what is known more of it."""
-
-
-def shifted(linear: LinearInputs) -> ShiftedMatrix:
-    """The matrix of a linear system, arranged once for all runs."""
-    return linear.cached("banded", lambda: ShiftedMatrix(linear.A))
-
-
-class _Factors:
-    """The factorisations of pole / h - J for one step length."""
-
-    def __init__(self, method: ShiftedCollocation, matrix: ShiftedMatrix) -> None:
-        self._method, self._poles = method, method.poles
-        self._matrix = matrix
-        self._step = 0.0
-        self._solvers: list[Solver] = []
-        self.count = 0
-
-    def load(self, matrix: Any) -> None:
-        """Take another Jacobian."""
-        self._matrix.load(matrix)
-        self._step = 0.0
-
-    def solve(self, step: float, right: Array) -> Array:
-        """The modes (s, n) for right sides (s, n), real parts above imaginary parts as they are."""
-        if step != self._step:
-            self._solvers = [self._matrix.factor(pole / step) for pole in self._poles]
-            self._step, self.count = step, self.count + 1
-        modes, vector = np.empty_like(right), np.empty(right.shape[1], dtype=complex)
-        for number, solver in enumerate(self._solvers):
-            vector.real, vector.imag = right[number], right[len(self._poles) + number]
-            solution = solver(vector)
-            modes[number], modes[len(self._poles) + number] = solution.real, solution.imag
-        return modes
-
-    def quieted(self, defect: Array, step: float, scale: Array, jacobian: Any) -> Array:
-        """F(h J) of a defect (n,), see `ShiftedCollocation.quieting`, by the factors of the last step."""
-        if (step * np.abs(jacobian @ defect) <= scale).all():
-            return defect
-        right = np.asarray(self._method.quieting / step * defect, dtype=np.complex128)
-        return np.asarray(self._solvers[0](right).real)
-
-
-class LinearStages(BandedStages):
-    """The stages of x' = A x + u(t), u a straight line in each piece: one solution for each pole.
-
-    Args:
-        linear: the system.
-        method: the collocation method.
-    """
-
-    def __init__(self, linear: LinearInputs, method: ShiftedCollocation) -> None:
-        self._matrix = sparse.csr_array(linear.A)
-        self._forcing, self._method = linear.forcing, method
-        self._factors = _Factors(method, shifted(linear))
-        # What a forcing of 1, and of the part of the step that has passed, give to each pole.
-        self._of_level = method.to_modes.sum(axis=1)
-        self._of_slope = method.to_modes @ method.nodes
-        self._piece: tuple[float, Array, Array]
-
-    @property
-    def counts(self) -> dict[str, int]:
-        return {"factorisations": self._factors.count}
-
-    @property
-    def noisy(self) -> bool:
-        return False
-
-    def open(self, piece: SmoothInterval) -> None:
-        length = piece.high - piece.low  # inside the piece, clear of what jumps at its ends
-        early, late = (np.asarray(self._forcing(piece.low + part * length)) for part in (0.25, 0.75))
-        slope = (late - early) / (0.5 * length)
-        slope[np.abs(slope) * length <= 8 * np.finfo(float).eps * np.abs(early)] = 0.0
-        self._piece = piece.low, early - 0.25 * length * slope, slope
-
-    def rate(self, t: float, x: Array) -> Array:
-        start, level, slope = self._piece
-        return np.asarray(self._matrix @ x + level + (t - start) * slope)
-
-    def modes(self, start: StepStart, step: float, _expected: Array | None = None, /) -> Array | None:
-        slope = self._piece[2]
-        right = np.multiply.outer(self._of_level, start.rate)
-        if slope.any():
-            right += np.multiply.outer(self._of_slope, step * slope)
-        return self._factors.solve(step, right)
-
-    def quieted(self, defect: Array, step: float, scale: Array) -> Array:
-        return self._factors.quieted(defect, step, scale, self._matrix)
-
-    def reason(self, reason: str) -> str:
-        return reason
-
-
-class NewtonStages(BandedStages):
-    """The stages of x' = f(t, x) by simplified Newton iterations; Jacobian and factors are kept while they serve.
-
-    Args:
-        problem: with a Jacobian.
-        matrix: arranged for it.
-        method: of Radau's family.
-    """
-
-    def __init__(self, problem: Problem, matrix: ShiftedMatrix, method: ShiftedCollocation) -> None:
-        self._problem, self._method = problem, method
-        self._factors = _Factors(method, matrix)
-        self._at_nodes = method.increments(method.nodes)
-        self._guard: GuardedFunctions
-        self._jacobian: Any = None
-        self._last: tuple[float, float, Array] | None = None
-        self._wanted = True
-        self._contraction = 1.0
-        self._rhs = self._jacobians = 0
-
-    @property
-    def counts(self) -> dict[str, int]:
-        return {"rhs": self._rhs, "jacobians": self._jacobians, "factorisations": self._factors.count}
-
-    @property
-    def noisy(self) -> bool:
-        return True
-
-    def open(self, piece: SmoothInterval) -> None:
-        self._guard = GuardedFunctions(self._problem, piece)
-        self._wanted, self._last = True, None
-
-    def rate(self, t: float, x: Array) -> Array:
-        self._rhs += 1
-        return self._guard.rhs(t, x)
-
-    def modes(self, start: StepStart, step: float, expected: Array | None = None, /) -> Array | None:
+        if self._linear is not None:  # from the rates at the nodes, were the state there that at the start
+            right = np.multiply.outer(self._of_level, start.rate)
+            if self._slope.any():
+                right += np.multiply.outer(self._of_slope, step * self._slope)
+            return self._solve(step, right)
         first = self._extrapolated(start, step) if expected is None else expected
         outdated = not self._wanted
         if self._wanted:
@@ -216,15 +302,38 @@ class NewtonStages(BandedStages):
         return modes
 
     def quieted(self, defect: Array, step: float, scale: Array) -> Array:
-        return self._factors.quieted(defect, step, scale, self._jacobian)
+        """The defect (n,) of the last step, without its stiff parts where these exceed the tolerance (n,).
+
+        F(h J) of it, see `ShiftedCollocation.quieting`, by the factors of the last step.
+        """
+        if (step * np.abs(self._jacobian @ defect) <= scale).all():
+            return defect
+        right = np.asarray(self._method.quieting / step * defect, dtype=np.complex128)
+        return np.asarray(self._solvers[0](right).real)
 
     def reason(self, reason: str) -> str:
+        """The reason of a failure, with what is known more of it."""
         return self._guard.reason(reason)
+
+    def _solve(self, step: float, right: Array) -> Array:
+        """The modes (s, n) for right sides (s, n), real parts above imaginary parts as they are."""
+        poles = self._method.poles
+        if step != self._factored:
+            self._solvers = [self._matrix.factor(pole / step) for pole in poles]
+            self._factored = step
+            self.counts["factorisations"] += 1
+        modes, vector = np.empty_like(right), np.empty(right.shape[1], dtype=complex)
+        for number, solver in enumerate(self._solvers):
+            vector.real, vector.imag = right[number], right[len(poles) + number]
+            solution = solver(vector)
+            modes[number], modes[len(poles) + number] = solution.real, solution.imag
+        return modes
 
     def _load(self, start: StepStart) -> None:
         self._jacobian = self._guard.jacobian(start.t, start.x)
-        self._factors.load(self._jacobian)
-        self._jacobians += 1
+        self._matrix.load(self._jacobian)
+        self._factored = 0.0
+        self.counts["jacobians"] += 1
         self._wanted, self._contraction = False, 1.0
 
     def _extrapolated(self, start: StepStart, step: float) -> Array:
@@ -244,7 +353,7 @@ class NewtonStages(BandedStages):
             rates = self._rates(start, step, self._at_nodes @ modes)
             if not np.isfinite(rates.sum()):
                 return None
-            change = self._factors.solve(step, self._method.to_modes @ rates - self._method.turn @ modes / step)
+            change = self._solve(step, self._method.to_modes @ rates - self._method.turn @ modes / step)
             modes += change
             size = float((np.abs(self._at_nodes @ change).max(axis=0) / start.scale).max())
             if not size < before:
@@ -262,7 +371,12 @@ class NewtonStages(BandedStages):
 
     def _rates(self, start: StepStart, step: float, increments: Array) -> Array:
         """The right-hand side (s, n) at the stages, in place of their increments."""
-        self._rhs += len(increments)
+        self.counts["rhs"] += len(increments)
         for node, row in zip(self._method.nodes, increments, strict=True):
             row[:] = self._guard.rhs(start.t + node * step, start.x + row)
         return increments
+
+
+def _shifted(linear: LinearInputs) -> ShiftedMatrix:
+    """The matrix of a linear system, arranged once for all runs."""
+    return linear.cached("banded", lambda: ShiftedMatrix(linear.A))

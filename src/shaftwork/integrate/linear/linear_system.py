@@ -1,28 +1,267 @@
-"""A linear system in scaled coordinates: its modes, its exponential, and its inputs that are straight lines."""
+"""A linear system in scaled coordinates: its modes, its exponential, and how they move under inputs.
+
+In its modes a motion is exact at any time, without any accumulation from step to step. Inputs are straight lines, or
+smooth ones that become polynomials; the motion under these is exact.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import expm
 from scipy.sparse.linalg import expm_multiply
 
 from shaftwork.core.calls import interruptible
 from shaftwork.core.errors import ParameterError
-from shaftwork.integrate.linear.modal import Eigensystem, find_modes
 from shaftwork.integrate.problem import Array, LinearInputs, Problem
 from shaftwork.integrate.smooth_intervals import SmoothInterval
 from shaftwork.integrate.stiffness import balance, norm, scale_by
+from shaftwork.numerics.polynomials import chebyshev_nodes, to_chebyshev, to_powers
+from shaftwork.numerics.tolerances import SAME
 
-# From so many states on LAPACK may take so long for the modes that Ctrl-C must not wait for it.
-LONG_WAIT = 100
+Complex = NDArray[np.complex128]
+
+# The modes may multiply rounding errors by this much; a defective matrix is far beyond.
+LARGEST_CONDITION = 1e4
+# Up to this size of their argument the phi functions are summed as series of so many terms.
+NEAR, SERIES_TERMS = 2.0, 24
+# Degree of a panel's polynomials, the part of an input that they may leave out, and that which rounding may take.
+DEGREE, LEFT_OUT, ROUNDED = 8, 1e-13, 1e-10
+# Panels of a run at least: where an input is nothing but for short blows, fewer nodes may all lie between these.
+FEWEST = 512
+# Inputs of more values in a run, states by nodes, are left to engines that step.
+MOST_VALUES = 10_000_000
+_NODES = (1 + chebyshev_nodes(DEGREE)) / 2
+# Values at the nodes of [0, 1] to the coefficients of the powers.
+_POWERS = to_powers(_NODES)
+_CHEBYSHEV = to_chebyshev(chebyshev_nodes(DEGREE))
+_FACTORIALS = np.cumprod([1.0, *range(1, DEGREE + 1)])
+# Values at a time in one evaluation of the motion: the functions phi of so many stay in a cache.
+BLOCK = 10_000
+# Intervals of a grid of an engine's own, or of outputs that are looked at: no accuracy depends on it.
+OWN_INTERVALS = 500
 # A forcing may differ from a straight line by this part of its size before it is refused.
 STRAIGHT = 1e-7
+
+
+@dataclass(frozen=True)
+class Eigensystem:
+    """Eigenvalues and eigenvectors of a real matrix that is well conditioned for them.
+
+    Of each conjugate pair one is kept, with its vector doubled: the motion is the real part of what it gives.
+
+    Args:
+        values: (k,) eigenvalues, 1/s.
+        vectors: (n, k), a column for each mode.
+        inverse: (k, n) rows of the inverse of all vectors.
+        condition: of all vectors, by which they may multiply rounding.
+    """
+
+    values: Complex
+    vectors: Complex
+    inverse: Complex
+    condition: float = 1.0
+
+    def response(self, start: Array, level: Array, slope: Array, elapsed: Array) -> Array:
+        """States (k, n) at times `elapsed` (k,) after a start state, for the input level + slope * elapsed.
+
+        Law: for each mode, e^z w + t phi1(z) a + t^2 phi2(z) b with z = lambda t.
+        """
+        z = np.multiply.outer(elapsed, self.values)
+        t = elapsed[:, None]
+        exponential = np.exp(z)
+        motion = exponential * (self.inverse @ start)
+        if level.any() or slope.any():
+            once, twice = phi(z, exponential, 2)
+            motion += t * once * (self.inverse @ level) + t**2 * twice * (self.inverse @ slope)
+        return np.ascontiguousarray((motion @ self.vectors.T).real)
+
+
+def find_modes(matrix: Any) -> Eigensystem | None:
+    """The modes of a dense (n, n) matrix, or None where they are too badly conditioned to be of use."""
+    lossless = _lossless_halves(matrix)
+    if lossless is not None:
+        return _lossless_modes(matrix, *lossless)
+    values, vectors = np.linalg.eig(matrix)
+    condition = float(np.linalg.cond(vectors))
+    if condition > LARGEST_CONDITION:
+        return None
+    inverse = np.linalg.inv(vectors).astype(complex)
+    upper = values.imag >= 0
+    weights = np.where(values.imag > 0, 2.0, 1.0)[upper]
+    return Eigensystem(values[upper].astype(complex), vectors[:, upper] * weights, inverse[upper], condition)
+
+
+def _lossless_halves(matrix: Array) -> tuple[Array, NDArray[np.bool_]] | None:
+    """The scale (n,) of the states whose squares add up to the energy, and which of them are speeds; or None.
+
+    A lossless network exchanges energy between speeds and torques alone: x_i' = a_ij x_j and x_j' = a_ji x_i give to
+    the one what they take from the other. Scales that make all pairs a_ij = -a_ji follow from state to state.
+    """
+    n = len(matrix)
+    scale, speeds, reached = np.ones(n), np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+    if (matrix * matrix.T > 0).any() or ((matrix == 0) != (matrix.T == 0)).any():
+        return None
+    for first in range(n):
+        waiting = [] if reached[first] else [first]
+        reached[first] = True
+        while waiting:
+            i = waiting.pop()
+            neighbours = np.flatnonzero((matrix[i] != 0) & ~reached)
+            scale[neighbours] = scale[i] * np.sqrt(-matrix[neighbours, i] / matrix[i, neighbours])
+            speeds[neighbours], reached[neighbours] = not speeds[i], True
+            waiting.extend(neighbours.tolist())
+    scaled = matrix * scale / scale[:, None]
+    if (np.abs(scaled + scaled.T) > SAME * np.abs(scaled)).any() or scaled[np.equal.outer(speeds, speeds)].any():
+        return None
+    return scale, speeds
+
+
+def _lossless_modes(matrix: Array, scale: Array, speeds: NDArray[np.bool_]) -> Eigensystem:
+    """Of v' = -B^T u, u' = B v, by B = U S V^T: the frequencies are S, real to the last bit, so no energy is lost.
+
+    An eigenvalue of a general decomposition has a real part of some roundings, which in time adds up.
+    """
+    halves = np.flatnonzero(speeds), np.flatnonzero(~speeds)
+    coupling = (matrix * scale / scale[:, None])[np.ix_(halves[1], halves[0])]
+    left, sizes, right = np.linalg.svd(coupling)
+    moving = sizes > sizes.max(initial=0.0) * len(matrix) * np.finfo(float).eps
+    rank, n = int(moving.sum()), len(matrix)
+    rows = np.zeros((n - rank, n), dtype=complex)
+    rows[: right.shape[0], halves[0]] = right
+    rows[:rank, halves[1]] = 1j * left.T[:rank]
+    rows[:rank] /= np.sqrt(2)
+    rows[right.shape[0] :, halves[1]] = left.T[rank:]
+    values = np.zeros(n - rank, dtype=complex)
+    values[:rank] = 1j * sizes[:rank]
+    weights = np.where(values.imag > 0, 2.0, 1.0)
+    vectors = rows.conj().T * weights * scale[:, None]
+    return Eigensystem(values, vectors.astype(complex), (rows / scale).astype(complex))
+
+
+def phi(z: Complex, exponential: Complex, count: int) -> Complex:
+    """phi_1 ... phi_count, (count, ...): phi_k = (phi_{k-1} - 1 / (k-1)!) / z, phi_0 = e^z.
+
+    Near zero, where these differences would cancel, the last one is summed as a series and the others follow from it.
+
+    Args:
+        z: where.
+        exponential: e^z, which a caller has already.
+        count: how many.
+    """
+    small = np.abs(z) < NEAR
+    inverse = 1.0 / np.where(small, NEAR, z)  # one division for all: a complex one costs as much as five products
+    values = np.empty((count, *z.shape), dtype=complex)
+    np.multiply(exponential - 1.0, inverse, out=values[0])
+    for k in range(1, count):
+        np.subtract(values[k - 1], 1 / math.factorial(k), out=values[k])
+        values[k] *= inverse
+    near = z[small]
+    series = np.ones_like(near)
+    for term in range(count + SERIES_TERMS, count, -1):
+        series *= near / term
+        series += 1.0
+    series /= math.factorial(count)
+    for k in range(count, 0, -1):
+        values[k - 1][small] = series
+        series = 1 / math.factorial(k - 1) + near * series
+    return values
+
+
+@dataclass(frozen=True)
+class Driven:
+    """The motion of a linear system in its modes over a span of time.
+
+    Args:
+        modes: of the system.
+        length: of each panel, s.
+        starts: (panels, modes) the modes at the start of each.
+        inputs: (panels, modes, degree + 1) coefficients of the powers of the share of a panel.
+    """
+
+    modes: Eigensystem
+    length: float
+    starts: Complex
+    inputs: Complex
+
+    def __call__(self, elapsed: Array) -> Array:
+        """States (k, n) at times (k,) in s after the start."""
+        rows = max(1, BLOCK // self.starts.shape[1])
+        blocks = [self._at(elapsed[first : first + rows]) for first in range(0, len(elapsed), rows)]
+        return np.concatenate([(block @ self.modes.vectors.T).real for block in blocks])
+
+    def _at(self, elapsed: Array) -> Complex:
+        panel = np.clip((elapsed / self.length).astype(int), 0, len(self.starts) - 1)
+        inside = elapsed - panel * self.length
+        return _moved(self.modes.values, self.length, inside, self.starts[panel], self.inputs[panel])
+
+
+def _moved(rates: Complex, length: float, inside: Array, start: Complex, inputs: Complex) -> Complex:
+    """The modes (k, m) some times (k,) after their starts (k, m), under inputs (k, m, degree + 1).
+
+    Law: e^z w + t sum_j (t / length)^j j! phi_{j+1}(z) c_j with z = lambda t.
+    """
+    z = np.multiply.outer(inside, rates)
+    exponential = np.exp(z)
+    motion = exponential * start
+    powers = _FACTORIALS[:, None] * inside * (inside / length) ** np.arange(DEGREE + 1)[:, None]
+    for j, function in enumerate(phi(z, exponential, DEGREE + 1)):
+        motion += function * (powers[j][:, None] * inputs[..., j])
+    return np.asarray(motion)
+
+
+def polynomials(forcing: Callable[[Array], Array], length: float, fewest: int, most: int) -> Array | None:
+    """Values (n, panels, degree + 1) of inputs at the nodes of panels that resolve them, or None where none do.
+
+    Law: panels are halved until the last Chebyshev coefficients of all inputs are below `LEFT_OUT` of the largest
+    value, or do not fall any more because they are the rounding of the time in the input.
+
+    Args:
+        forcing: inputs (n, k) at times (k,) in s after the start, smooth.
+        length: of the span, s.
+        fewest: panels, at least.
+        most: values, at most.
+    """
+    panels, before, each = fewest, np.inf, (DEGREE + 1) * len(forcing(np.zeros(1)))
+    while panels * each <= most:
+        times = length / panels * (np.arange(panels)[:, None] + _NODES)
+        values = forcing(times.ravel()).reshape(-1, panels, DEGREE + 1)
+        largest = np.maximum(np.abs(values).max(axis=(1, 2)), np.finfo(float).tiny)
+        if not np.isfinite(largest).all():  # an input without a value somewhere has no polynomial there
+            return None
+        last = np.abs(values @ _CHEBYSHEV.T)[..., -2:].max(axis=(1, 2))
+        rough = float((last / largest).max(initial=0.0))
+        if rough <= LEFT_OUT or before / 4 < rough <= ROUNDED:
+            return values
+        panels, before = 2 * panels, rough
+    return None
+
+
+def driven(modes: Eigensystem, values: Array, start: Array, length: float) -> Driven:
+    """The motion from a start state under inputs.
+
+    Args:
+        modes: of the system.
+        values: of the inputs, from `polynomials`.
+        start: (n,) state.
+        length: of the span, s.
+    """
+    step = length / values.shape[1]
+    inputs = np.einsum("mn,npj->pmj", modes.inverse, values @ _POWERS.T, optimize=True)
+    starts = np.zeros(inputs.shape[:2], dtype=complex)
+    gained = _moved(modes.values, step, np.full(len(starts), step), starts, inputs)
+    decay = np.exp(modes.values * step)
+    starts[0] = modes.inverse @ start
+    for panel in range(1, len(starts)):
+        starts[panel] = decay * starts[panel - 1] + gained[panel - 1]
+    return Driven(modes, step, starts, inputs)
 
 
 class LinearSystem:
@@ -43,8 +282,7 @@ class LinearSystem:
     @cached_property
     def modes(self) -> Eigensystem | None:
         """The modes, or None where they are too badly conditioned."""
-        matrix = self.matrix.toarray()
-        return interruptible(find_modes, matrix) if len(matrix) >= LONG_WAIT else find_modes(matrix)
+        return interruptible(find_modes, self.matrix.toarray())
 
 
 def system_of(linear: LinearInputs) -> LinearSystem:

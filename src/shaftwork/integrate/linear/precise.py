@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from shaftwork.integrate.linear.linear_system import are_even, straight_line
+from shaftwork.integrate.linear.linear_system import OWN_INTERVALS, are_even, straight_line
 from shaftwork.integrate.problem import Array, Fractions, LinearInputs, Problem
 from shaftwork.integrate.smooth_intervals import PiecewiseDense, SmoothInterval, pieces
 from shaftwork.integrate.stiffness import balance, scale_by
@@ -29,8 +29,6 @@ SERIES = 10
 DEGREE, LEFT_OUT = 20, 2e-14
 # A motion that rings in more panels than these goes on in floats from exact nodes; at few times it is computed anew.
 MOST_PANELS, FEW = 200, 64
-INTERVALS = 500
-"""Steps of a motion that rings."""
 Nearby = Callable[[Array, Array, Array], Array]
 _COEFFICIENTS = to_chebyshev(chebyshev_nodes(DEGREE))
 # The exponential of a matrix of this norm has a series of few terms; those of longer times are its squares.
@@ -234,7 +232,7 @@ class PrecisePiece:
     @cached_property
     def _nodes(self) -> tuple[Array, Array]:
         """Times (k,) and states (k, n) between which a motion that rings is computed in floats."""
-        times = np.linspace(self.piece.start, self.piece.end, INTERVALS + 1)
+        times = np.linspace(self.piece.start, self.piece.end, OWN_INTERVALS + 1)
         return times, self.exactly(times)
 
     @property

@@ -11,9 +11,18 @@ from itertools import pairwise
 import numpy as np
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.integrate.linear.linear_system import LinearSystem, are_even, propagator_of, straight_line, system_of
-from shaftwork.integrate.linear.modal import FEWEST, MOST_VALUES, driven, polynomials
-from shaftwork.integrate.linear.observation import difference, doubt
+from shaftwork.integrate.linear.linear_system import (
+    FEWEST,
+    MOST_VALUES,
+    OWN_INTERVALS,
+    LinearSystem,
+    are_even,
+    driven,
+    polynomials,
+    propagator_of,
+    straight_line,
+    system_of,
+)
 from shaftwork.integrate.linear.precise import (
     Nearby,
     PrecisePiece,
@@ -22,11 +31,11 @@ from shaftwork.integrate.linear.precise import (
     precise_system,
     seconds,
 )
+from shaftwork.integrate.linear.rounding_errors import WORTH_SAYING, difference, doubt
 from shaftwork.integrate.problem import Array, LinearInputs, Problem, Trajectory
 from shaftwork.integrate.smooth_intervals import SmoothInterval, both_sides, failure, pieces, piecewise, start_of_piece
+from shaftwork.integrate.stiffness import LARGEST_EIGENVALUES
 
-# Intervals of the engine's own output grid, which no accuracy depends on.
-OWN_INTERVALS = 500
 # Measured on one core: a dense product does about this many multiplications a second, a sparse product takes this long.
 DENSE_RATE, SPARSE_CALL, SPARSE_RATE = 1e10, 1e-5, 5e8
 # Products with A that the truncated Taylor series of `expm_multiply` takes for a unit of (norm of A) * time.
@@ -35,10 +44,8 @@ TAYLOR_PRODUCTS = 6.0
 MOST_HALVINGS = 40
 # States up to which inputs that are no straight lines are followed mode by mode.
 LARGEST_DRIVEN = 600
-# What rounding may change before a run is made in whole numbers, and the estimate of its time up to which it is, s.
-DOUBTED, LONGEST_PRECISE = 1e-7, 10.0
-# States up to which other engines are measured against this one.
-LARGEST_REFERENCE = 200
+# A run that rounding spoils is made in whole numbers up to this estimate of its time, s.
+LONGEST_PRECISE = 10.0
 
 
 def solve(problem: Problem) -> Trajectory:
@@ -71,7 +78,7 @@ def solve(problem: Problem) -> Trajectory:
     system = system_of(linear)
     trajectory = _propagated(problem, system, _in_floats(problem, system))
     part = doubt(problem, trajectory, _lost(problem, system, trajectory))
-    if part <= DOUBTED:
+    if part <= WORTH_SAYING:
         return replace(trajectory, doubt=part)
     precise = _precise(problem, system)
     if precise is None:
@@ -168,10 +175,10 @@ def _precise(problem: Problem, system: LinearSystem) -> PreciseSystem | None:
 def reference(problem: Problem) -> Trajectory | None:
     """The motion against which another engine is measured; None where it would take too long or is in doubt itself."""
     linear = problem.linear
-    if linear is None or problem.x0.size > LARGEST_REFERENCE or not (linear.straight or drivable(problem)):
+    if linear is None or problem.x0.size > LARGEST_EIGENVALUES or not (linear.straight or drivable(problem)):
         return None
     trajectory = solve(problem)
-    return trajectory if trajectory.doubt <= DOUBTED else None
+    return trajectory if trajectory.doubt <= WORTH_SAYING else None
 
 
 def drivable(problem: Problem) -> bool:
@@ -259,7 +266,10 @@ class _ExactDense:
 
     @cached_property
     def steps(self) -> Array:
-        """The nodes, and ever longer steps after the start of a piece: what fades fast there lies between some."""
+        """The nodes, and ever longer steps after the start of a piece: what fades fast there lies between some.
+
+        At a damping ratio of 1e4 the energy residual would be 2e-5 without them, where it is 2e-10.
+        """
         return np.unique(np.concatenate([self._graded(span.times) for span in self._spans]))
 
     def _graded(self, nodes: Array) -> Array:

@@ -13,17 +13,25 @@ from numpy.typing import NDArray
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.problem import Array
 from shaftwork.integrate.smooth_intervals import SmoothInterval, failure, pieces, start_of_piece
-from shaftwork.waves.delay_engine.collocation import GAUSS, POWERS, STAGES, STATE_POWERS, WEIGHTS, values_at
+from shaftwork.numerics.tolerances import SAME
+from shaftwork.waves.delay_engine.collocation import (
+    GAUSS,
+    POWERS,
+    RESOLVED,
+    STAGES,
+    STATE_POWERS,
+    WEIGHTS,
+    Scales,
+    left_out,
+    values_at,
+)
 from shaftwork.waves.delay_engine.lines import DelayProblem, DelayTrajectory, Past, past_of
-from shaftwork.waves.delay_engine.scales import RESOLVED, Scales, left_out
 from shaftwork.waves.delay_engine.waveforms import WavePanels, trajectory
 
 # Numbers of panels.
 Numbers = NDArray[np.intp]
 # So many numbers may describe the past of a motion that is marched in blocks side by side.
 LARGEST_BLOCK = 300
-# Times are the same up to this part of the period.
-ROUNDING = 1e-12
 # Numbers of so large a size show the matrices of an affine function without the rounding of its constant.
 PROBE = 2.0**40
 # They are seen so early in the first piece, at a share of it: later a law may have lost its value.
@@ -166,7 +174,7 @@ class Lattice:
     @property
     def near(self) -> float:
         """Times nearer than this, in s, are the same."""
-        return 16 * math.ulp(max(abs(self.problem.t0), abs(self.problem.t_end))) + ROUNDING * self._period
+        return 16 * math.ulp(max(abs(self.problem.t0), abs(self.problem.t_end))) + SAME * self._period
 
     def time(self, panel: int) -> float:
         """Start time of a panel in s."""

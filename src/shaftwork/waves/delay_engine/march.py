@@ -13,11 +13,20 @@ from shaftwork.integrate.engines import WAVE
 from shaftwork.integrate.guards import GuardWatch
 from shaftwork.integrate.problem import Array, Trajectory
 from shaftwork.integrate.smooth_intervals import PiecewiseDense, failure, pieces, reached, start_of_piece
-from shaftwork.waves.delay_engine.collocation import GAUSS, LEFT, POWERS, RADAU, RIGHT, STATE_POWERS, Scheme
-from shaftwork.waves.delay_engine.lines import DelayProblem, Lines, past_of
-from shaftwork.waves.delay_engine.scales import RESOLVED, Scales, left_out
+from shaftwork.waves.delay_engine.collocation import (
+    GAUSS,
+    LEFT,
+    POWERS,
+    RADAU,
+    RESOLVED,
+    RIGHT,
+    STATE_POWERS,
+    Scales,
+    Scheme,
+    left_out,
+)
+from shaftwork.waves.delay_engine.lines import DelayProblem, Lines, WaveHistory, past_of
 from shaftwork.waves.delay_engine.stages import CollocationStages
-from shaftwork.waves.delay_engine.wave_history import WaveHistory
 from shaftwork.waves.delay_engine.waveforms import Polynomials, Restriction, StatesDense, WavePanels
 
 # The shortest panel takes this part of rtol times the shortest delay.
