@@ -9,9 +9,8 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import brentq, linear_sum_assignment
 
-from shaftwork.frequency.model_slopes import Complex
 from shaftwork.frequency.natural_modes import Modes, natural_frequencies
-from shaftwork.results.observer import Array
+from shaftwork.results.observer import Array, Complex
 
 REFINED = 1e-12
 """To this fraction a speed is found that is sought."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from shaftwork.core.parameters import numbers_in_si
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complexfloating[Any, Any]]
 
 RPM = 30 / np.pi
 """1/min of a rad/s."""

@@ -13,13 +13,13 @@ from sympy import Symbol
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import ParameterError, SimulationError
 from shaftwork.frequency.analysis import Given, Point, Time, operating_point
-from shaftwork.frequency.model_slopes import Complex
 from shaftwork.hybrid.phased_model import PhasedModel
 from shaftwork.pipeline.arguments import relative_tolerance, time_span
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import refuse_motion
 from shaftwork.results.course import SMALLEST, turning_points
 from shaftwork.results.measures import KINDS, Measure
+from shaftwork.results.observer import Complex
 from shaftwork.results.solution import Solution
 from shaftwork.sensitivities.differentiable import rows_of, smooth_parameters, without_start
 from shaftwork.sensitivities.differentiation import Derivatives

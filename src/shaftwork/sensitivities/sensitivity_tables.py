@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shaftwork.core.errors import imported
-from shaftwork.frequency.model_slopes import Complex
 from shaftwork.frequency.natural_modes import damping_ratios, natural_frequencies
-from shaftwork.results.observer import Array
+from shaftwork.results.observer import Array, Complex
 
 if TYPE_CHECKING:
     import pandas as pd

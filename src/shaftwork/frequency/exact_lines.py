@@ -31,8 +31,8 @@ from typing import Any
 
 import numpy as np
 
-from shaftwork.frequency.model_slopes import Complex, Motions, OpenSlopes
-from shaftwork.results.observer import Array
+from shaftwork.frequency.linearization import Linearization
+from shaftwork.results.observer import Array, Complex
 
 SMALL = 0.1
 """Below this G^2 the slope of sinhc is taken from its series."""
@@ -138,9 +138,9 @@ class ExactSlopes:
         lengths: of the shafts, m.
     """
 
-    open: OpenSlopes
+    open: Linearization
     lines: ExactLines
-    meshed: Motions
+    meshed: Linearization
     profiles: Mapping[str, tuple[str, tuple[float, ...]]]
     lengths: tuple[float, ...]
 
@@ -222,3 +222,7 @@ class ExactSlopes:
             return np.asarray(inside[number][:, int(owner.rpartition(".")[2])])
 
         return amplitude
+
+
+Motions = Linearization | ExactSlopes
+"""Small motions about a point, and a way to read every quantity of them by its name."""
