@@ -29,7 +29,7 @@ from shaftwork.formulation.value_diagnosis import speeds_along
 from shaftwork.frequency import campbell as diagram
 from shaftwork.frequency.linear_model import ExactModel, LinearModel, linear_model
 from shaftwork.frequency.linearization import Linearization
-from shaftwork.frequency.natural_modes import Modes
+from shaftwork.frequency.natural_modes import MOVES, Modes
 from shaftwork.network.controlled import Reading, readings_of
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.kinds import Kind
@@ -37,9 +37,6 @@ from shaftwork.network.wording import listed
 from shaftwork.pipeline.arguments import as_names
 from shaftwork.pipeline.settled import SteadyState
 from shaftwork.results.solution import Solution
-
-SAME = 1e-9
-"""Ratios that differ by less are equal, and a speed below this part of the largest is none."""
 
 
 def speeds_to_give(model: CompiledModel) -> Mapping[str, float | None]:
@@ -74,7 +71,7 @@ def as_multiple(ratio: float | None) -> str:
     if ratio is None:
         return "..."
     sign, size = "-" * (ratio < 0), abs(ratio)
-    if abs(size - 1) < SAME:
+    if abs(size - 1) < MOVES:
         return f"{sign}n"
     return f"{sign}n/{1 / size:.10g}" if size < 1 else f"{sign}{size:.10g}*n"
 
@@ -119,7 +116,7 @@ def warn_of_turning_angles(bound: BoundArrays, t: float, x: Array) -> None:
     """
     form, first = bound.program.form, len(x) - len(bound.program.form.integrals)
     rates = np.abs(bound.rhs(t, x)[first:])
-    turns = rates > SAME * np.append(rates, np.abs(x[: len(form.across_states)])).max(initial=0.0)
+    turns = rates > MOVES * np.append(rates, np.abs(x[: len(form.across_states)])).max(initial=0.0)
     angles = zip(form.integrals, form.states[first:], x[first:], strict=True)
     for branch, state, value in compress(angles, turns):
         if readers := _readers(form, branch):

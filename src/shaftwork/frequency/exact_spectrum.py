@@ -17,7 +17,7 @@ from shaftwork.core.errors import NetworkWarning, ParameterError, SimulationErro
 from shaftwork.core.notices import warn
 from shaftwork.frequency.exact_lines import ExactSlopes
 from shaftwork.frequency.frequency_response import solved_densely
-from shaftwork.frequency.natural_modes import Modes, checked_count, largest_rate, modes_of, states_that_act
+from shaftwork.frequency.natural_modes import EQUAL, Modes, checked_count, largest_rate, modes_of, states_that_act
 from shaftwork.results.observer import Array, Complex, blocks
 
 ITERATIONS, CONVERGED, SETTLED = 30, 1e-15, 1e-9
@@ -167,8 +167,6 @@ WIDER = 1.3
 """The mesh is right up to so many times the largest rate wanted: the circle for the count passes a gap between."""
 BELOW = 0.5
 """Modes are sought up to this fraction of the rate at which, without number, they crowd."""
-TOGETHER = 1e-6
-"""Starts that differ by less than this fraction are refined together; roots that differ by less than half are one."""
 ROOM = 1.001
 """A circle for a number of modes reaches so many times as far as the next one."""
 FADED, SINGULAR = 40.0, 1e13
@@ -290,16 +288,16 @@ def _refined(problem: ExactProblem, starts: Complex, radius: float) -> tuple[Com
         except SimulationError:
             continue
         new = [k for k, root in enumerate(roots) if 0 < abs(root) < radius and root.imag >= 0]
-        new = [k for k in new if (np.abs(rates - roots[k]) > TOGETHER / 2 * abs(roots[k])).all()]
+        new = [k for k in new if (np.abs(rates - roots[k]) > EQUAL / 2 * abs(roots[k])).all()]
         rates, vectors = np.append(rates, roots[new]), np.hstack([vectors, shapes[:, new]])
     return rates, vectors
 
 
 def _together(starts: Complex) -> list[list[int]]:
-    """Groups of starts that lie close together."""
+    """Groups of starts that are equal, to be refined together."""
     groups: list[list[int]] = []
     for k in np.lexsort((starts.real, starts.imag)).tolist():
-        near = groups and abs(starts[groups[-1][0]] - starts[k]) <= TOGETHER * abs(starts[k])
+        near = groups and abs(starts[groups[-1][0]] - starts[k]) <= EQUAL * abs(starts[k])
         groups[-1].append(k) if near else groups.append([k])
     return groups
 

@@ -24,9 +24,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 EQUAL = 1e-6
-"""Amplitudes that differ by less than this fraction are equal: the first of them is the reference of the shape."""
+"""Amplitudes, rates and frequencies that differ by less than this fraction are equal: of several largest amplitudes the
+first is the reference of the shape."""
 MOVES = 1e-9
-"""A node takes part in a mode when its amplitude is more than this fraction of the largest."""
+"""A node moves when its amplitude, or speed, is more than this fraction of the largest."""
 SHOWN, LABELS = 6, 20
 """Modes in a picture when nobody says which, and the most nodes that are named under it."""
 

@@ -1,22 +1,174 @@
-"""A quantity over a motion as polynomials of degree 7 on parted panels of time, with its extremes and turning points.
+"""A quantity over a motion on parted panels of time: polynomials with their extremes and turning points, and integrals.
 
-Law: a panel's polynomial goes through the values at Lobatto's eight points. Where it follows the quantity its Chebyshev
-coefficients fall, and the last of them say what it misses. Source: Trefethen, Approximation Theory and Approximation
-Practice, chapters 3 and 8.
+Law: a panel's polynomial, of degree 7, goes through the values at Lobatto's eight points. Where it follows the quantity
+its Chebyshev coefficients fall, and the last of them say what it misses. Integrals are those of Lobatto's rule, to
+rounding, in panels that are parted where that still changes something. Source: Trefethen, Approximation Theory and
+Approximation Practice, chapters 3 and 8.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.polynomial.polynomial import polyval
 from numpy.typing import NDArray
 
-from shaftwork.numerics.polynomials import chebyshev_nodes, to_chebyshev, to_powers
+from shaftwork.numerics.polynomials import chebyshev_nodes, lobatto_rule, to_chebyshev, to_powers, to_slopes
 from shaftwork.numerics.zeros import Chosen, zeros
 from shaftwork.results.observer import Array, blocks
-from shaftwork.results.quadrature import NODES, SHARE, LobattoPanels
 from shaftwork.results.reader import Read
+
+NODES, WEIGHTS = lobatto_rule(7)
+"""Of Lobatto's rule, which reads both ends: there peaks are, and a jump close to an end is not overlooked."""
+LEAST = 64
+"""Panels of a run at least: an exact engine has few steps."""
+TIGHT = 1e-13
+"""Change of an integral by parting all panels that is none, as a fraction of the integral of the integrand's size."""
+MOST_INTEGRATED = 100_000
+"""Panels of an integral; a motion that asks for more, such as torque of mere noise, is integrated as far as that."""
+SHARE = 0.41
+"""Of a panel is the first of its two parts: of a jump in the middle, halves and the whole would say the same."""
+NOISE, FALLS, GROWS = 1e-9, 0.75, 1.5
+"""Changes below the first fraction are noise where parting leaves this share of them, and so many times the panels."""
+
+_RATES = to_slopes(NODES, NODES)
+
+
+@dataclass(frozen=True, eq=False)
+class LobattoPanels:
+    """Parts of a span of time, each with the nodes of Lobatto's rule.
+
+    Args:
+        start: (p,) ascending, s.
+        end: (p,) s.
+    """
+
+    start: Array
+    end: Array
+
+    @classmethod
+    def between(cls, edges: Array) -> LobattoPanels:
+        """Panels from each time to the next, s."""
+        return cls(edges[:-1], edges[1:])
+
+    @classmethod
+    def joined(cls, parts: Sequence[LobattoPanels]) -> tuple[LobattoPanels, NDArray[np.intp]]:
+        """The panels of all parts, ascending, and their order."""
+        start, end = (np.concatenate([getattr(part, side) for part in parts]) for side in ("start", "end"))
+        order = np.argsort(start, kind="stable")
+        return cls(start[order], end[order]), order
+
+    @property
+    def length(self) -> Array:
+        """(p,) s."""
+        return self.end - self.start
+
+    @property
+    def times(self) -> Array:
+        """(p, 8) nodes, ascending, s; the last a rounding before the end, where another panel may begin with a jump."""
+        times: Array = self.start[:, None] + self.length[:, None] * (NODES + 1) / 2
+        times[:, -1] = np.nextafter(self.end, self.start)
+        return times
+
+    def parted(self) -> LobattoPanels:
+        """Two panels for each."""
+        middle = self.start + SHARE * self.length
+        start, end = np.stack([self.start, middle], axis=1), np.stack([middle, self.end], axis=1)
+        return LobattoPanels(start.ravel(), end.ravel())
+
+    def split(self, times: Array) -> LobattoPanels:
+        """Panels that also end at times (k,) inside the span, which they fill without gaps."""
+        start = np.unique(np.append(self.start, times))
+        return LobattoPanels(start, np.append(start[1:], self.end[-1]))
+
+    def integrals(self, values: Array) -> Array:
+        """(..., p) integrals over each panel of values (..., p, 8) at the nodes."""
+        return np.asarray(values @ WEIGHTS * self.length / 2)
+
+    def slopes(self, values: Array) -> Array:
+        """(p, 8) derivatives by time of the polynomials through values (p, 8)."""
+        return np.asarray(values @ _RATES.T * 2 / self.length[:, None])
+
+    def taken(self, which: NDArray[Any] | slice) -> LobattoPanels:
+        """Some of them, marked or numbered."""
+        return LobattoPanels(self.start[which], self.end[which])
+
+
+@dataclass(frozen=True, eq=False)
+class Integrals:
+    """Integrals of m quantities over panels in which all of them are smooth.
+
+    Args:
+        panels: p of them, ascending, without gaps.
+        values: (m, p) over each panel.
+        sizes: (m, p) those of the size of each quantity.
+    """
+
+    panels: LobattoPanels
+    values: Array
+    sizes: Array
+
+    @property
+    def totals(self) -> Array:
+        """(m,) over the run."""
+        return np.asarray(self.values.sum(axis=1))
+
+
+def integrate(
+    integrand: Callable[[LobattoPanels], Array], steps: Array, *, alike: bool = False, width: int = 1
+) -> Integrals:
+    """Integrals of several quantities over a run.
+
+    A kink or a jump within a step is closed in by parting; the ends of steps are ends of panels. What is read of the
+    quantities at once does not grow with the number of steps.
+
+    Args:
+        integrand: (m, p, 8) the quantities at the nodes of panels.
+        steps: (s,) times between which the motion is smooth, s.
+        alike: whether the quantities are of one kind: what is little beside the largest need not be known better.
+        width: numbers that are read for them at one time.
+    """
+    least = max(1, LEAST // len(steps))
+    edges = np.append((steps[:-1, None] + np.diff(steps)[:, None] * np.arange(least) / least).ravel(), steps[-1])
+    panels = LobattoPanels.between(edges)
+    shortest = SHORTEST * np.spacing(np.abs(steps).max())
+    whole, _ = _integrals(integrand, panels, width)
+    first, count, before, size = len(panels.start), 0, (np.inf, 0), np.zeros(len(whole))
+    settled: list[tuple[LobattoPanels, Array, Array]] = []
+    while len(panels.start):
+        parts = panels.parted()
+        fine, sizes = _integrals(integrand, parts, width)
+        change = np.abs(fine.reshape(len(fine), -1, 2).sum(axis=2) - whole)
+        scale = np.maximum(size + sizes.sum(axis=1), np.finfo(float).tiny)[:, None]
+        scale = scale.max(axis=0, keepdims=True, initial=0.0) if alike else scale
+        rough, open_ = float((change / scale).sum(axis=1).max(initial=0.0)), len(panels.start)
+        count += 2 * open_
+        noisy = FALLS * before[0] < rough <= NOISE and open_ > GROWS * before[1]
+        done = (change <= TIGHT * scale / first).all(axis=0) | (panels.length <= shortest)
+        if rough <= TIGHT or count > MOST_INTEGRATED or noisy:
+            done[:] = True
+        done = np.repeat(done, 2)
+        size = size + sizes[:, done].sum(axis=1)
+        settled.append((parts.taken(done), fine[:, done], sizes[:, done]))
+        panels, whole, before = parts.taken(~done), fine[:, ~done], (rough, open_)
+    panels, order = LobattoPanels.joined([part for part, *_ in settled])
+    values, sizes = (np.concatenate([one[k] for one in settled], axis=1)[:, order] for k in (1, 2))
+    return Integrals(panels, values, sizes)
+
+
+def _integrals(integrand: Callable[[LobattoPanels], Array], panels: LobattoPanels, width: int) -> tuple[Array, Array]:
+    """(m, p) integrals over panels of quantities and of their sizes."""
+    fine, sizes = list[Array](), list[Array]()
+    for block in blocks(len(panels.start), width * len(NODES)):
+        part = panels.taken(block)
+        values = integrand(part)
+        fine.append(part.integrals(values))
+        sizes.append(part.integrals(np.abs(values)))
+    return np.concatenate(fine, axis=1), np.concatenate(sizes, axis=1)
+
 
 Mask = NDArray[np.bool_]
 
@@ -168,18 +320,13 @@ def _turns(values: Array, low: Array, high: Array) -> Array:
     """Where in their panels polynomials through values (k, 8) turn between two places."""
     slope, bend = values @ _SLOPES.T, values @ _BENDS.T
 
+    def at(powers: Array, places: Array) -> Array:
+        return np.asarray(polyval(places, powers.T, tensor=False))
+
     def slopes(chosen: Chosen, places: Array) -> tuple[Array, Array]:
-        return _at(slope[chosen], places), _at(bend[chosen], places)
+        return at(slope[chosen], places), at(bend[chosen], places)
 
-    return zeros(slopes, low, high, rising=_at(slope, low) <= 0, iterations=NEWTON)
-
-
-def _at(powers: Array, places: Array) -> Array:
-    """Polynomials (k, d), their lowest power first, each at a place (k,)."""
-    value = powers[:, -1]
-    for column in powers.T[-2::-1]:
-        value = value * places + column
-    return np.asarray(value)
+    return zeros(slopes, low, high, rising=at(slope, low) <= 0, iterations=NEWTON)
 
 
 @dataclass(frozen=True, eq=False)

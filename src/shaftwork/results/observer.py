@@ -20,9 +20,9 @@ AT_ONCE = 4_000_000
 
 
 def blocks(count: int, width: int) -> Iterator[slice]:
-    """Places 0 to `count` in blocks, of as many as are read at once where each holds `width` numbers."""
+    """Places 0 to `count` in blocks, of as many as are read at once where each holds `width` numbers; at least one."""
     rows = max(1, AT_ONCE // max(1, width))
-    return (slice(first, min(first + rows, count)) for first in range(0, count, rows))
+    return (slice(first, min(first + rows, count)) for first in range(0, max(count, 1), rows))
 
 
 def array_in_si(name: str, values: Any, unit: str) -> Array:

@@ -17,13 +17,7 @@ from shaftwork.hybrid.modes.mode_machines import ModeNames, with_modes
 from shaftwork.hybrid.phases import Phases
 from shaftwork.pipeline.model import Model
 from shaftwork.sensitivities.differentiation import Differentiated
-from shaftwork.sensitivities.legs import Leg
-
-CLOSE = 1e-5
-"""The run took a path whose states differ from its own by no more than this part of their size: it meets hard stops
-late by what rounding moves them, which is much for what hardly moves any more."""
-ALIKE = 1e-10
-"""Paths lead to the same states where these differ by no more than this part of their size."""
+from shaftwork.sensitivities.legs import LATE, SAME, Leg
 
 
 class _ModeStep(NamedTuple):
@@ -100,8 +94,8 @@ class SensitivityTransfer:
                 continue
             candidates.append((float((np.abs(states - end.after) / sizes).max(initial=0.0)), k, slopes))
         nearest = min((away for away, *_ in candidates), default=np.inf)
-        if nearest <= CLOSE:
-            return next((k, slopes) for away, k, slopes in candidates if away <= nearest + ALIKE)
+        if nearest <= LATE:
+            return next((k, slopes) for away, k, slopes in candidates if away <= nearest + SAME)
         names = ", ".join(dict.fromkeys(f"'{change.element.name}'" for change in changes)) or "parts"
         raise SimulationError(
             f"At t = {after.start:.9g} s {names} change together, and how the derivatives pass that is not known here. "

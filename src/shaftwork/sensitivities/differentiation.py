@@ -25,10 +25,26 @@ from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.discontinuities import switches, switches_of
 from shaftwork.components.law_slopes import slope
 from shaftwork.components.laws import t as TIME
+from shaftwork.core.errors import CompileError
 from shaftwork.formulation.explicit_rows import Rows
 from shaftwork.formulation.form import State, StateForm
 from shaftwork.formulation.gains import Number, exact_of
 from shaftwork.formulation.observables import Observables
+from shaftwork.pipeline.model import Model
+
+
+def rows_of(model: Model) -> Rows:
+    """The symbolic equations of a model.
+
+    Raises:
+        CompileError: it has none.
+    """
+    if model.rows is None:
+        raise CompileError(
+            f"'{model.name}' has no symbolic equations to differentiate: it is too large, too closely coupled, or "
+            "holds waves. Take fewer elements, such as model=Lumped(10), or differences of two runs."
+        )
+    return model.rows
 
 
 class Values:

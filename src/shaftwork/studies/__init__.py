@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from shaftwork.sensitivities.study import frequency_sensitivities, motion_sensitivities
+from shaftwork.sensitivities.sensitivities import frequency_sensitivities, motion_sensitivities
 from shaftwork.studies.stability import Cell, Stability, stability
 from shaftwork.studies.stability_cases import Case
 from shaftwork.studies.work_precision import work_precision
