@@ -38,6 +38,15 @@ from shaftwork.pipeline.arguments import as_names
 from shaftwork.pipeline.settled import SteadyState
 from shaftwork.results.solution import Solution
 
+Given = Mapping[str, float] | None
+Point = Given | Solution
+Names = str | Sequence[str] | None
+Time = float | None
+SmallMotions = Callable[[Point, Time, Names], LinearModel | ExactModel]
+"""From a point, a time and names of inputs to the network near that point."""
+NAMED = 4
+"""Values of a point that a title names."""
+
 
 def speeds_to_give(model: CompiledModel) -> Mapping[str, float | None]:
     """The speeds that tell how a network turns, as multiples of the first; None where that does not tell them.
@@ -153,16 +162,6 @@ def _bends(graph: CircuitGraph, branch: int) -> bool:
 
 def _ends(graph: CircuitGraph, branch: int) -> tuple[int, int]:
     return graph.branches[branch].plus, graph.branches[branch].minus
-
-
-Given = Mapping[str, float] | None
-Point = Given | Solution
-Names = str | Sequence[str] | None
-Time = float | None
-SmallMotions = Callable[[Point, Time, Names], LinearModel | ExactModel]
-"""From a point, a time and names of inputs to the network near that point."""
-NAMED = 4
-"""Values of a point that a title names."""
 
 
 def linearized(

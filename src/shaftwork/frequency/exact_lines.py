@@ -16,8 +16,8 @@ The states x of the network between the shafts, and V and W of each of them, swi
     s x = A x + Bh h(s) + (B + s B1) v        what arrives at the ends, h = tau - Z omega, drives the network
     omega(s) = C x + Dh h(s) + D v            the ends of the shafts turn as the nodes do
 
-with h(s) and omega(s) linear in V and W. One small matrix for each s (`exact_problem`): its solutions are the frequency
-response, its singular points the rates of the modes.
+with h(s) and omega(s) linear in V and W. One small matrix for each s (`exact_spectrum`): its solutions are the
+frequency response, its singular points the rates of the modes.
 
 Source: the telegraph equations; Popenda 2019, (8)-(12), with d/dt replaced by s.
 """

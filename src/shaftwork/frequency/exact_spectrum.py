@@ -26,6 +26,20 @@ POINTS = (256, 512, 1024, 2048, 4096, 8192, 16384)
 """Points on a half circle for the count of the roots in it; two numbers of points must agree."""
 WHOLE = 0.01
 """A count is whole when it is nearer to a whole number than this."""
+MODES = 10
+"""Modes where nobody says how many."""
+WIDER = 1.3
+"""The mesh is right up to so many times the largest rate wanted: the circle for the count passes a gap between."""
+BELOW = 0.5
+"""Modes are sought up to this fraction of the rate at which, without number, they crowd."""
+ROOM = 1.001
+"""A circle for a number of modes reaches so many times as far as the next one."""
+FADED, SINGULAR = 40.0, 1e13
+"""At the rate -FADED / T what fades grows to beyond rounding: the matrix then has this condition where none echoes."""
+AUDIBLE = 3.0
+"""Half waves up to which the count tells an end that takes all from one that throws back some rounding."""
+Starts = Callable[[float, int], Modes]
+"""The modes of the network with meshes that are right for |rate| up to a radius, the finer the later the attempt."""
 
 
 class ExactProblem:
@@ -159,23 +173,6 @@ def _basis(matrix: Complex, vectors: Complex) -> Complex:
         floored = np.maximum(sizes, np.finfo(float).eps * sizes[0])[:, None]
         solved = right.conj().T @ (left.conj().T @ vectors / floored)
     return np.asarray(np.linalg.qr(solved)[0])
-
-
-MODES = 10
-"""Modes where nobody says how many."""
-WIDER = 1.3
-"""The mesh is right up to so many times the largest rate wanted: the circle for the count passes a gap between."""
-BELOW = 0.5
-"""Modes are sought up to this fraction of the rate at which, without number, they crowd."""
-ROOM = 1.001
-"""A circle for a number of modes reaches so many times as far as the next one."""
-FADED, SINGULAR = 40.0, 1e13
-"""At the rate -FADED / T what fades grows to beyond rounding: the matrix then has this condition where none echoes."""
-AUDIBLE = 3.0
-"""Half waves up to which the count tells an end that takes all from one that throws back some rounding."""
-
-Starts = Callable[[float, int], Modes]
-"""The modes of the network with meshes that are right for |rate| up to a radius, the finer the later the attempt."""
 
 
 def find_exact_modes(

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from shaftwork.numerics.polynomials import chebyshev_nodes, lobatto_rule, to_chebyshev, to_powers, to_slopes
 from shaftwork.numerics.zeros import Chosen, zeros
-from shaftwork.results.observer import Array, blocks
-from shaftwork.results.reader import Read
+from shaftwork.results.observer import Array, Read, blocks
 
 NODES, WEIGHTS = lobatto_rule(7)
 """Of Lobatto's rule, which reads both ends: there peaks are, and a jump close to an end is not overlooked."""
@@ -33,8 +32,41 @@ SHARE = 0.41
 """Of a panel is the first of its two parts: of a jump in the middle, halves and the whole would say the same."""
 NOISE, FALLS, GROWS = 1e-9, 0.75, 1.5
 """Changes below the first fraction are noise where parting leaves this share of them, and so many times the panels."""
+ROUGH, FINE, EVEN = 1e-3, 1e-9, 1e-6
+"""Of the range: what a polynomial may miss anywhere, where it may hold an extreme, and where all turns are wanted.
 
+A turn is read where the polynomial has it, so its height is right to the square of these.
+"""
+TAIL, SAFETY = 3, 8.0
+"""So many last coefficients say what a polynomial misses, with this factor: those of noise are as large as all."""
+CLOSE, SHAKES = 1e-6 * np.arange(6), 20.0
+"""Of a panel: times so close that only rounding bends what is read there; misses up to so many times this are noise."""
+ROUNDINGS = 100 * float(np.finfo(float).eps)
+"""Of the largest value: what rounding alone makes a polynomial miss."""
+SHORTEST = 16
+"""Rounding units of time: a panel so short holds a jump, and its ends are the two sides of it."""
+MOST = 2_000_000
+"""Panels of a course, which take 128 MB; where a motion asks for more, as mere noise does, the rest stays rough."""
+LOOKS = chebyshev_nodes(32)
+"""Where in a panel, from -1 to 1, its polynomial is looked at."""
+NEWTON = 5
+"""Steps to a turn between two looks."""
+SMALLEST = 1e-6
+"""Ups and downs of less than this part of the range make no peak, where nobody says otherwise."""
+LATER = 1e-3
+"""A peak that is higher by this fraction of what counts as a change is no later one."""
+
+Mask = NDArray[np.bool_]
 _RATES = to_slopes(NODES, NODES)
+_DEGREE = len(NODES) - 1
+_TAILS = to_chebyshev(NODES)[-TAIL:]
+_POWERS = to_powers(NODES)
+_SLOPES = _POWERS[1:] * np.arange(1, _DEGREE + 1)[:, None]
+_BENDS = _SLOPES[1:] * np.arange(1, _DEGREE)[:, None]
+_VALUES_THERE = np.vander(LOOKS, _DEGREE + 1, increasing=True) @ _POWERS
+_SLOPES_THERE = np.vander(LOOKS, _DEGREE, increasing=True) @ _SLOPES
+_BETWEEN = 1.0 / np.cos(0.5 * np.pi * _DEGREE / (len(LOOKS) - 1))
+"""No polynomial of this degree is larger between the looks by more than this factor (Ehlich and Zeller, 1964)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,31 +150,31 @@ class Integrals:
 
 
 def integrate(
-    integrand: Callable[[LobattoPanels], Array], steps: Array, *, alike: bool = False, width: int = 1
+    integrand: Callable[[LobattoPanels], Array], steps: Array, *, alike: bool = False, size: float = 0.0
 ) -> Integrals:
     """Integrals of several quantities over a run.
 
-    A kink or a jump within a step is closed in by parting; the ends of steps are ends of panels. What is read of the
-    quantities at once does not grow with the number of steps.
+    A kink or a jump within a step is closed in by parting; the ends of steps are ends of panels.
 
     Args:
         integrand: (m, p, 8) the quantities at the nodes of panels.
         steps: (s,) times between which the motion is smooth, s.
         alike: whether the quantities are of one kind: what is little beside the largest need not be known better.
-        width: numbers that are read for them at one time.
+        size: the largest integral of a size over what was before, beside which it need not be known better either.
     """
     least = max(1, LEAST // len(steps))
     edges = np.append((steps[:-1, None] + np.diff(steps)[:, None] * np.arange(least) / least).ravel(), steps[-1])
     panels = LobattoPanels.between(edges)
     shortest = SHORTEST * np.spacing(np.abs(steps).max())
-    whole, _ = _integrals(integrand, panels, width)
-    first, count, before, size = len(panels.start), 0, (np.inf, 0), np.zeros(len(whole))
+    whole, first, count, before = panels.integrals(integrand(panels)), len(panels.start), 0, (np.inf, 0)
+    scales = np.full(len(whole), max(size, float(np.finfo(float).tiny)))
     settled: list[tuple[LobattoPanels, Array, Array]] = []
     while len(panels.start):
         parts = panels.parted()
-        fine, sizes = _integrals(integrand, parts, width)
+        values = integrand(parts)
+        fine, sizes = parts.integrals(values), parts.integrals(np.abs(values))
         change = np.abs(fine.reshape(len(fine), -1, 2).sum(axis=2) - whole)
-        scale = np.maximum(size + sizes.sum(axis=1), np.finfo(float).tiny)[:, None]
+        scale = (scales + sizes.sum(axis=1))[:, None]
         scale = scale.max(axis=0, keepdims=True, initial=0.0) if alike else scale
         rough, open_ = float((change / scale).sum(axis=1).max(initial=0.0)), len(panels.start)
         count += 2 * open_
@@ -151,60 +183,12 @@ def integrate(
         if rough <= TIGHT or count > MOST_INTEGRATED or noisy:
             done[:] = True
         done = np.repeat(done, 2)
-        size = size + sizes[:, done].sum(axis=1)
+        scales += sizes[:, done].sum(axis=1)
         settled.append((parts.taken(done), fine[:, done], sizes[:, done]))
         panels, whole, before = parts.taken(~done), fine[:, ~done], (rough, open_)
     panels, order = LobattoPanels.joined([part for part, *_ in settled])
     values, sizes = (np.concatenate([one[k] for one in settled], axis=1)[:, order] for k in (1, 2))
     return Integrals(panels, values, sizes)
-
-
-def _integrals(integrand: Callable[[LobattoPanels], Array], panels: LobattoPanels, width: int) -> tuple[Array, Array]:
-    """(m, p) integrals over panels of quantities and of their sizes."""
-    fine, sizes = list[Array](), list[Array]()
-    for block in blocks(len(panels.start), width * len(NODES)):
-        part = panels.taken(block)
-        values = integrand(part)
-        fine.append(part.integrals(values))
-        sizes.append(part.integrals(np.abs(values)))
-    return np.concatenate(fine, axis=1), np.concatenate(sizes, axis=1)
-
-
-Mask = NDArray[np.bool_]
-
-ROUGH, FINE, EVEN = 1e-3, 1e-9, 1e-6
-"""Of the range: what a polynomial may miss anywhere, where it may hold an extreme, and where all turns are wanted.
-
-A turn is read where the polynomial has it, so its height is right to the square of these.
-"""
-TAIL, SAFETY = 3, 8.0
-"""So many last coefficients say what a polynomial misses, with this factor: those of noise are as large as all."""
-CLOSE, SHAKES = 1e-6 * np.arange(6), 20.0
-"""Of a panel: times so close that only rounding bends what is read there; misses up to so many times this are noise."""
-ROUNDINGS = 100 * float(np.finfo(float).eps)
-"""Of the largest value: what rounding alone makes a polynomial miss."""
-SHORTEST = 16
-"""Rounding units of time: a panel so short holds a jump, and its ends are the two sides of it."""
-MOST = 2_000_000
-"""Panels of a course, which take 128 MB; where a motion asks for more, as mere noise does, the rest stays rough."""
-LOOKS = chebyshev_nodes(32)
-"""Where in a panel, from -1 to 1, its polynomial is looked at."""
-NEWTON = 5
-"""Steps to a turn between two looks."""
-SMALLEST = 1e-6
-"""Ups and downs of less than this part of the range make no peak, where nobody says otherwise."""
-LATER = 1e-3
-"""A peak that is higher by this fraction of what counts as a change is no later one."""
-
-_DEGREE = len(NODES) - 1
-_TAILS = to_chebyshev(NODES)[-TAIL:]
-_POWERS = to_powers(NODES)
-_SLOPES = _POWERS[1:] * np.arange(1, _DEGREE + 1)[:, None]
-_BENDS = _SLOPES[1:] * np.arange(1, _DEGREE)[:, None]
-_VALUES_THERE = np.vander(LOOKS, _DEGREE + 1, increasing=True) @ _POWERS
-_SLOPES_THERE = np.vander(LOOKS, _DEGREE, increasing=True) @ _SLOPES
-_BETWEEN = 1.0 / np.cos(0.5 * np.pi * _DEGREE / (len(LOOKS) - 1))
-"""No polynomial of this degree is larger between the looks by more than this factor (Ehlich and Zeller, 1964)."""
 
 
 @dataclass(frozen=True, eq=False)

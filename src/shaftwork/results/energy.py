@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from shaftwork.results.course import LobattoPanels, integrate
+from shaftwork.results.course import NODES, LobattoPanels, integrate
 from shaftwork.results.observer import Array, DenseStates, Observer, blocks
 
 
@@ -75,19 +75,28 @@ def energy_balance(observer: Observer, dense: DenseStates, steps: Array) -> Ener
         rows = [power for by_part in observer.powers(times, dense(times)) for power in by_part.values()]
         return np.array(rows).reshape(len(rows), *panels.times.shape)
 
-    flow = integrate(powers, steps, alike=True, width=_width(observer, dense, steps))
-    inside = np.searchsorted(steps, flow.panels.start, side="right")  # the end of the step of each panel
-    by_step = np.array([np.bincount(inside, row, minlength=len(steps)) for row in flow.values])
-    totals = dict(zip(lost, flow.totals.tolist(), strict=False))
-    given = dict(zip(supplied, flow.totals[len(lost) :].tolist(), strict=True))
+    count = len(lost) + len(supplied)
+    by_step, totals, sizes = np.zeros((2, len(steps))), np.zeros(count), np.zeros(count)
+    losses, supplies = slice(len(lost)), slice(len(lost), None)
+    for block in blocks(len(steps) - 1, 2 * len(NODES) * _width(observer, dense, steps)):  # of both parts of each
+        ends = slice(block.start, block.stop + 1)
+        flow = integrate(powers, steps[ends], alike=True, size=float(sizes.max(initial=0.0)))
+        inside = np.searchsorted(steps[ends], flow.panels.start, side="right")  # the end of the step of each panel
+        rows = [flow.values[part].sum(axis=0) for part in (losses, supplies)]
+        by_step[:, ends] += [np.bincount(inside, row, minlength=len(steps[ends])) for row in rows]
+        totals += flow.totals
+        sizes += flow.sizes.sum(axis=1)
     return EnergyBalance(
         t=steps,
         stored=after,
-        supplied=np.cumsum(by_step[len(lost) :].sum(axis=0) + impulses),
-        lost=np.cumsum(by_step[: len(lost)].sum(axis=0) + _total(hits, len(steps))),
-        work=float(flow.sizes[len(lost) :].sum() + np.abs(impulses).sum()),
-        lost_in=_sums(totals, {part: float(energy.sum()) for part, energy in hits.items()}),
-        supplied_by=_sums(given, at_once),
+        supplied=np.cumsum(by_step[1] + impulses),
+        lost=np.cumsum(by_step[0] + _total(hits, len(steps))),
+        work=float(sizes[supplies].sum() + np.abs(impulses).sum()),
+        lost_in=_sums(
+            dict(zip(lost, totals[losses].tolist(), strict=True)),
+            {part: float(energy.sum()) for part, energy in hits.items()},
+        ),
+        supplied_by=_sums(dict(zip(supplied, totals[supplies].tolist(), strict=True)), at_once),
     )
 
 

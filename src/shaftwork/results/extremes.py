@@ -11,11 +11,25 @@ import numpy as np
 from shaftwork.core.errors import AccuracyWarning
 from shaftwork.core.notices import warn
 from shaftwork.results.course import course
-from shaftwork.results.observer import Array
-from shaftwork.results.reader import Reader
+from shaftwork.results.observer import Array, Reader
 
 SHOWN = 20
 """Quantities in the table of all."""
+HIDDEN, STRAYED = 0.05, 0.2
+"""Of the largest value: what samples may miss of an extreme, and the root mean square by which lines between samples
+may miss the quantity. Seven samples in a swing miss a twentieth of it."""
+LEAST = 50
+"""Fewer output times are a list of moments, of which nobody expects extremes."""
+LOOKS, MOST_LOOKS, MOST_VALUES = 4, 30_000, 1_000_000
+"""Times between two neighbours of the outputs and steps, and in all, at which quantities are looked at; values of all
+that is read there, beyond which there are fewer times."""
+SHARES = np.arange(1, 9) * (np.sqrt(5) - 1) / 2 % 1
+"""Where between its neighbours a time lies: in step with nothing that swings, and few, for engines that take as many
+matrix exponentials as there are distances from a step end."""
+NARROWEST, OFFSETS = 1e-6, 100
+"""Of the time between two samples, how wide a turn is at least; at so many distances from it that is looked for."""
+MOST_OUTPUTS = 10_000_000
+"""Output times that can be asked for."""
 
 
 class Extreme(float):
@@ -133,23 +147,6 @@ class Extremes(Mapping[str, tuple[Extreme, Extreme]]):
         return "\n".join([f"'{self._reader.title}'", self.table(names[:SHOWN]), *more])
 
     __repr__ = __str__
-
-
-HIDDEN, STRAYED = 0.05, 0.2
-"""Of the largest value: what samples may miss of an extreme, and the root mean square by which lines between samples
-may miss the quantity. Seven samples in a swing miss a twentieth of it."""
-LEAST = 50
-"""Fewer output times are a list of moments, of which nobody expects extremes."""
-LOOKS, MOST_LOOKS, MOST_VALUES = 4, 30_000, 1_000_000
-"""Times between two neighbours of the outputs and steps, and in all, at which quantities are looked at; values of all
-that is read there, beyond which there are fewer times."""
-SHARES = np.arange(1, 9) * (np.sqrt(5) - 1) / 2 % 1
-"""Where between its neighbours a time lies: in step with nothing that swings, and few, for engines that take as many
-matrix exponentials as there are distances from a step end."""
-NARROWEST, OFFSETS = 1e-6, 100
-"""Of the time between two samples, how wide a turn is at least; at so many distances from it that is looked for."""
-MOST_OUTPUTS = 10_000_000
-"""Output times that can be asked for."""
 
 
 def warn_of_coarse_samples(reader: Reader, t: Array, x: Array, names: Sequence[str] = ()) -> None:

@@ -12,9 +12,8 @@ import numpy as np
 from shaftwork.core.errors import ParameterError, SignalError, imported
 from shaftwork.core.parameters import in_si, whole, without_unit
 from shaftwork.results.course import SMALLEST, TurningPoints, turning_points
-from shaftwork.results.observer import Array
+from shaftwork.results.observer import Array, Read, Reader
 from shaftwork.results.plotting import new_figure
-from shaftwork.results.reader import Read, Reader
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,8 +10,7 @@ import numpy as np
 from shaftwork.core.errors import ParameterError
 from shaftwork.results.course import LobattoPanels, integrate
 from shaftwork.results.fatigue import SNLine
-from shaftwork.results.observer import Array
-from shaftwork.results.reader import Read
+from shaftwork.results.observer import Array, Read
 from shaftwork.results.solution import Solution
 
 KINDS: Mapping[str, str] = {

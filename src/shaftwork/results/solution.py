@@ -18,9 +18,8 @@ from shaftwork.results.course import SMALLEST
 from shaftwork.results.energy import EnergyBalance, energy_balance
 from shaftwork.results.extremes import Extreme, Extremes, warn_of_coarse_samples
 from shaftwork.results.fatigue import Damage, Rainflow, SNLine, damage_of, damages, load_cycles
-from shaftwork.results.observer import Array, DenseStates, Observer, PhaseRow, array_in_si
+from shaftwork.results.observer import Array, DenseStates, Observer, PhaseRow, Reader, array_in_si
 from shaftwork.results.plotting import plot_signals
-from shaftwork.results.reader import Reader
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import product
 from typing import NamedTuple
 
@@ -102,26 +102,20 @@ class SensitivityTransfer:
             "Take the difference of two variants, studies.sweep(...)."
         )
 
-    def _paths(self, before: Leg, after: Leg, changes: Sequence[Change]) -> Iterator[tuple[_ModeStep, ...]]:
+    def _paths(self, before: Leg, after: Leg, changes: Sequence[Change]) -> Iterable[tuple[_ModeStep, ...]]:
         """Paths to the modes that follow, the plainest first."""
-        seen: list[tuple[_ModeStep, ...]] = []
-        for every in (False, True):
-            for besides in (False, True):
-                steps = self._path(before.modes, after.modes, changes, every=every, besides=besides)
-                if steps not in seen:
-                    seen.append(steps)
-                    yield steps
+        paths = (self._path(before.modes, after.modes, changes, besides=besides) for besides in (False, True))
+        return dict.fromkeys(paths)
 
     def _path(
-        self, modes: ModeNames, last: ModeNames, changes: Sequence[Change], *, every: bool, besides: bool
+        self, modes: ModeNames, last: ModeNames, changes: Sequence[Change], *, besides: bool
     ) -> tuple[_ModeStep, ...]:
-        """One path.
+        """One path, on which each impact takes up what is stored, and in the end all changes together.
 
         Args:
             modes: before.
             last: after.
             changes: in their order.
-            every: each change takes up what is stored by itself; else impacts alone do, and in the end all.
             besides: in an impact other elements are already in the modes that follow.
         """
         numbers = {id(element): k for k, element in enumerate(self._phases.elements)}
@@ -130,7 +124,6 @@ class SensitivityTransfer:
             number = numbers[id(change.element)]
             if not change.impact:
                 modes = with_modes(modes, {number: change.after})
-                steps += [_ModeStep(modes)] if every else []
                 continue
             others = {numbers[id(later.element)]: later.after for later in changes[place + 1 :] if not later.impact}
             modes = with_modes(modes, {**(others if besides else {}), number: change.after})

@@ -45,6 +45,15 @@ _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(STAGES)
 NODES = (_POINTS + 1) / 2
 # integrals from the start of a step to each node and to its end, from values at the nodes
 _TO_NODES, _TO_END = to_integrals(_POINTS) / 2, _WEIGHTS / 2
+ROUNDING = 1e-3
+"""What a change of a parameter by all of itself does to a state is rounding below this part of the state's size."""
+DOUBTFUL = 1e-6
+"""Relative error of derivatives from which on there is a warning."""
+APART = 1e-3
+"""Two changes depend on parameters apart where the derivatives of their times differ by more than this part of them, or
+of the run for all of a parameter."""
+BESIDE = 1e-3
+"""A quantity is looked at so far beside its extreme, in steps of the run, to see where it turns."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,17 +179,6 @@ def _solved(both: Array, size: int, lengths: Array) -> Array:
     moved = h * np.einsum("ij,sjpc->sipc", _TO_NODES, K)
     beside = both[:, :, size:] + both[:, :, size:, :size] @ moved
     return np.asarray(lengths[:, None, None] * np.einsum("i,sipc->spc", _TO_END, np.concatenate([K, beside], axis=2)))
-
-
-ROUNDING = 1e-3
-"""What a change of a parameter by all of itself does to a state is rounding below this part of the state's size."""
-DOUBTFUL = 1e-6
-"""Relative error of derivatives from which on there is a warning."""
-APART = 1e-3
-"""Two changes depend on parameters apart where the derivatives of their times differ by more than this part of them, or
-of the run for all of a parameter."""
-BESIDE = 1e-3
-"""A quantity is looked at so far beside its extreme, in steps of the run, to see where it turns."""
 
 
 class MotionSlopes:

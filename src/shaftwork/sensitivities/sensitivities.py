@@ -26,7 +26,7 @@ from shaftwork.results.course import SMALLEST, turning_points
 from shaftwork.results.measures import EXTREMES, KINDS, POWERS, Measure
 from shaftwork.results.observer import Complex
 from shaftwork.results.solution import Solution
-from shaftwork.sensitivities.differentiation import Derivatives, rows_of
+from shaftwork.sensitivities.differentiation import SlopeMatrix, rows_of
 from shaftwork.sensitivities.legs import SAME, motion_of
 from shaftwork.sensitivities.motion_slopes import MotionSlopes
 from shaftwork.sensitivities.sensitivity_tables import FrequencySensitivities, MotionSensitivities
@@ -38,6 +38,16 @@ TIGHTER, TIGHTEST = 1e-2, 1e-13
 """Of the tolerance of derivatives is that of the motion, and no engine takes a smaller one."""
 ALIKE = 1e-7
 """They change alike where their percents for a percent of a parameter differ by no more than this."""
+NO_DERIVATIVE = {
+    "decisive": "decides which equations hold, so nothing is smooth in it. Give it a value that is not exactly zero, "
+    "and ratios that are not alike.",
+    "whole": "is a whole number, so nothing is smooth in it. Take the difference of two variants, studies.sweep(...).",
+    "seed": "is the seed of a noise: another number is another noise. Leave it out.",
+    "edge": "moves a switch that is exactly at the start or at the end of the motion, where it comes in or goes out. "
+    "Take another t_end, or leave it out.",
+}
+SHIFT = 1e-3
+"""By this part a parameter is made smaller."""
 
 
 def frequency_sensitivities(
@@ -62,13 +72,14 @@ def frequency_sensitivities(
     model = network_of(net).compile()
     equations, p, x, time = _near(model, at, t)
     names = smooth_parameters(model, _listed(parameters), (model, equations))
-    derivatives = Derivatives(rows_of(equations), tuple(Symbol(name, real=True) for name in names))
-    matrix = derivatives.by_states(time, x, p)
+    rows = rows_of(equations)
+    jacobian = SlopeMatrix(rows, rows.rates, rows.states)
+    matrix = jacobian(time, x, p)
     rates, left, right = eig(matrix, left=True, right=True)
     swinging = np.flatnonzero(rates.imag > 0)
     swinging = swinging[np.argsort(np.abs(rates[swinging]), kind="stable")]
     _refuse_equal(rates, swinging, _roundings(matrix, left, right))
-    changes = derivatives.jacobian_slopes(time, x, p)
+    changes = jacobian.differentiated(tuple(Symbol(name, real=True) for name in names), time, x, p)
     slopes = np.array([_slope(left[:, k], changes, right[:, k]) for k in swinging]).reshape(len(swinging), len(names))
     values = dict(zip(equations.parameters, p.tolist(), strict=True))
     nominal = {name: values.get(name, model.parameters[name]) for name in names}
@@ -244,18 +255,6 @@ def _extreme(measure: Measure, slopes: MotionSlopes) -> tuple[float, Array]:
         )
     best = int(heights.argmax())
     return float(signs[best] * turns.values[best]), np.asarray(derivatives[highest.index(best)])
-
-
-NO_DERIVATIVE = {
-    "decisive": "decides which equations hold, so nothing is smooth in it. Give it a value that is not exactly zero, "
-    "and ratios that are not alike.",
-    "whole": "is a whole number, so nothing is smooth in it. Take the difference of two variants, studies.sweep(...).",
-    "seed": "is the seed of a noise: another number is another noise. Leave it out.",
-    "edge": "moves a switch that is exactly at the start or at the end of the motion, where it comes in or goes out. "
-    "Take another t_end, or leave it out.",
-}
-SHIFT = 1e-3
-"""By this part a parameter is made smaller."""
 
 
 def smooth_parameters(

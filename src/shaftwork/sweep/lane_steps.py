@@ -40,6 +40,23 @@ WIDTH = 8
 
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
+NEARLY = 0.1
+"""Of the range: so near to the top a peak and a dip between the same two samples are looked for."""
+PLACES, NEWTON = 7, 5
+"""Places at which a polynomial is looked at, and steps to a peak between two of them."""
+INSIDE = 1e-4
+"""Of an interval: the motion is followed to so far from its ends."""
+NEAR = 1e-9
+"""Of the range: a peak is known where Newton's step rises by less, or a polynomial misses it by less; one that is so
+near zero need not be found. Of the time: between samples that are closer the larger one is the peak. What is stored has
+gone over unchanged where it differs by less than this part of the largest of its kind, and of 1."""
+CLOSE = 0.01
+"""Of an interval: a polynomial is trusted so far from where it has been put right."""
+MOST_ROUNDS, MOST_ITERATIONS = 20, 100
+ROUNDING, ROUNDINGS = 2 * float(np.finfo(float).eps), 16
+"""A time is known to rounding, and to so many roundings of the step."""
+There = Callable[[Index, Index, Array], Array]
+"""Jets (3, c) at times (c,) in s, from samples (c,) of lanes (c,)."""
 
 
 class Room:
@@ -60,7 +77,7 @@ class Steps:
     """Some steps of lanes.
 
     Args:
-        step: a `codegen.lane_step.LaneStep`.
+        step: a `lane_step.LaneStep`.
         taken: (used, k) what it takes of the parameters.
         columns: (m + 1, height, k) at the start, and what each of m steps has written.
     """
@@ -112,7 +129,7 @@ class LaneRun:
     """Lanes on their way.
 
     Args:
-        step: a `codegen.lane_step.LaneStep`.
+        step: a `lane_step.LaneStep`.
         room: for its steps.
         x: (n, k) states.
         rates: (n, k) theirs.
@@ -188,26 +205,6 @@ class LaneRun:
 def _padded(count: int) -> Index:
     """Numbers of lanes, and the last one again up to a multiple of the width."""
     return np.minimum(np.arange(-(-count // WIDTH) * WIDTH), count - 1)
-
-
-NEARLY = 0.1
-"""Of the range: so near to the top a peak and a dip between the same two samples are looked for."""
-PLACES, NEWTON = 7, 5
-"""Places at which a polynomial is looked at, and steps to a peak between two of them."""
-INSIDE = 1e-4
-"""Of an interval: the motion is followed to so far from its ends."""
-NEAR = 1e-9
-"""Of the range: a peak is known where Newton's step rises by less, or a polynomial misses it by less; one that is so
-near zero need not be found. Of the time: between samples that are closer the larger one is the peak. What is stored has
-gone over unchanged where it differs by less than this part of the largest of its kind, and of 1."""
-CLOSE = 0.01
-"""Of an interval: a polynomial is trusted so far from where it has been put right."""
-MOST_ROUNDS, MOST_ITERATIONS = 20, 100
-ROUNDING, ROUNDINGS = 2 * float(np.finfo(float).eps), 16
-"""A time is known to rounding, and to so many roundings of the step."""
-
-There = Callable[[Index, Index, Array], Array]
-"""Jets (3, c) at times (c,) in s, from samples (c,) of lanes (c,)."""
 
 
 def largest(t: Array, jets: Array, best: Array, there: There) -> Array:
