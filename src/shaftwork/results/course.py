@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.polynomial.polynomial import polyval
@@ -80,14 +80,16 @@ class LobattoPanels:
 
     start: Array
     end: Array
+    nodes: ClassVar[Array] = NODES
+    weights: ClassVar[Array] = WEIGHTS
 
     @classmethod
-    def between(cls, edges: Array) -> LobattoPanels:
+    def between(cls, edges: Array) -> Self:
         """Panels from each time to the next, s."""
         return cls(edges[:-1], edges[1:])
 
     @classmethod
-    def joined(cls, parts: Sequence[LobattoPanels]) -> tuple[LobattoPanels, NDArray[np.intp]]:
+    def joined(cls, parts: Sequence[LobattoPanels]) -> tuple[Self, NDArray[np.intp]]:
         """The panels of all parts, ascending, and their order."""
         start, end = (np.concatenate([getattr(part, side) for part in parts]) for side in ("start", "end"))
         order = np.argsort(start, kind="stable")
@@ -105,11 +107,11 @@ class LobattoPanels:
         times[:, -1] = np.nextafter(self.end, self.start)
         return times
 
-    def parted(self) -> LobattoPanels:
+    def parted(self) -> Self:
         """Two panels for each."""
         middle = self.start + SHARE * self.length
         start, end = np.stack([self.start, middle], axis=1), np.stack([middle, self.end], axis=1)
-        return LobattoPanels(start.ravel(), end.ravel())
+        return type(self)(start.ravel(), end.ravel())
 
     def split(self, times: Array) -> LobattoPanels:
         """Panels that also end at times (k,) inside the span, which they fill without gaps."""
@@ -118,15 +120,26 @@ class LobattoPanels:
 
     def integrals(self, values: Array) -> Array:
         """(..., p) integrals over each panel of values (..., p, 8) at the nodes."""
-        return np.asarray(values @ WEIGHTS * self.length / 2)
+        return np.asarray(values @ self.weights * self.length / 2)
 
     def slopes(self, values: Array) -> Array:
         """(p, 8) derivatives by time of the polynomials through values (p, 8)."""
         return np.asarray(values @ _RATES.T * 2 / self.length[:, None])
 
-    def taken(self, which: NDArray[Any] | slice) -> LobattoPanels:
+    def taken(self, which: NDArray[Any] | slice) -> Self:
         """Some of them, marked or numbered."""
-        return LobattoPanels(self.start[which], self.end[which])
+        return type(self)(self.start[which], self.end[which])
+
+
+class GaussPanels(LobattoPanels):
+    """Parts of a span of time with the nodes of Gauss' rule, which reads no ends: there a power may have no value."""
+
+    nodes, weights = np.polynomial.legendre.leggauss(len(NODES))
+
+    @property
+    def times(self) -> Array:
+        """(p, 8) nodes, ascending, s."""
+        return np.asarray(self.start[:, None] + self.length[:, None] * (self.nodes + 1) / 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +163,12 @@ class Integrals:
 
 
 def integrate(
-    integrand: Callable[[LobattoPanels], Array], steps: Array, *, alike: bool = False, size: float = 0.0
+    integrand: Callable[[LobattoPanels], Array],
+    steps: Array,
+    *,
+    rule: type[LobattoPanels] = LobattoPanels,
+    alike: bool = False,
+    size: float = 0.0,
 ) -> Integrals:
     """Integrals of several quantities over a run.
 
@@ -159,12 +177,13 @@ def integrate(
     Args:
         integrand: (m, p, 8) the quantities at the nodes of panels.
         steps: (s,) times between which the motion is smooth, s.
+        rule: the panels.
         alike: whether the quantities are of one kind: what is little beside the largest need not be known better.
         size: the largest integral of a size over what was before, beside which it need not be known better either.
     """
     least = max(1, LEAST // len(steps))
     edges = np.append((steps[:-1, None] + np.diff(steps)[:, None] * np.arange(least) / least).ravel(), steps[-1])
-    panels = LobattoPanels.between(edges)
+    panels = rule.between(edges)
     shortest = SHORTEST * np.spacing(np.abs(steps).max())
     whole, first, count, before = panels.integrals(integrand(panels)), len(panels.start), 0, (np.inf, 0)
     scales = np.full(len(whole), max(size, float(np.finfo(float).tiny)))
@@ -186,7 +205,7 @@ def integrate(
         scales += sizes[:, done].sum(axis=1)
         settled.append((parts.taken(done), fine[:, done], sizes[:, done]))
         panels, whole, before = parts.taken(~done), fine[:, ~done], (rough, open_)
-    panels, order = LobattoPanels.joined([part for part, *_ in settled])
+    panels, order = rule.joined([part for part, *_ in settled])
     values, sizes = (np.concatenate([one[k] for one in settled], axis=1)[:, order] for k in (1, 2))
     return Integrals(panels, values, sizes)
 

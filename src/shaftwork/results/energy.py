@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from shaftwork.results.course import NODES, LobattoPanels, integrate
+from shaftwork.results.course import NODES, GaussPanels, LobattoPanels, integrate
 from shaftwork.results.observer import Array, DenseStates, Observer, blocks
 
 
@@ -80,7 +80,7 @@ def energy_balance(observer: Observer, dense: DenseStates, steps: Array) -> Ener
     losses, supplies = slice(len(lost)), slice(len(lost), None)
     for block in blocks(len(steps) - 1, 2 * len(NODES) * _width(observer, dense, steps)):  # of both parts of each
         ends = slice(block.start, block.stop + 1)
-        flow = integrate(powers, steps[ends], alike=True, size=float(sizes.max(initial=0.0)))
+        flow = integrate(powers, steps[ends], rule=GaussPanels, alike=True, size=float(sizes.max(initial=0.0)))
         inside = np.searchsorted(steps[ends], flow.panels.start, side="right")  # the end of the step of each panel
         rows = [flow.values[part].sum(axis=0) for part in (losses, supplies)]
         by_step[:, ends] += [np.bincount(inside, row, minlength=len(steps[ends])) for row in rows]
