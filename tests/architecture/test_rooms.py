@@ -15,7 +15,7 @@ USES = {
     "hybrid": "braked.simulate(0.1, engine='scipy')",
     "waves": "through_shaft.simulate(0.01)",
     "sweep": "at('sweep.sweep').sweep(net, {'shaft.c': [90, 110]}, t_end=0.1, measures=['max shaft.tau'])",
-    "sensitivities": "at('sensitivities.study').motion_sensitivities(net, ['end J2.omega'], t_end=0.1)",
+    "sensitivities": "at('sensitivities.sensitivities').motion_sensitivities(net, ['end J2.omega'], t_end=0.1)",
     "frequency": "net.modes()",
     "lagrange": "net.lagrangian()",
     "latex": "net.equations().latex()",

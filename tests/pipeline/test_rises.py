@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import shaftwork as sw
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.studies import sweep
-from shaftwork.sweep.lane_extremes import first_rises
+from shaftwork.sweep.lane_steps import first_rises
 
 
 def wave(phase: Array, level: Array, t: Array) -> Array:

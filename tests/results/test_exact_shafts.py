@@ -11,7 +11,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 import shaftwork as sw
-from shaftwork.frequency.exact_shafts import exact_spectrum
+from shaftwork.frequency import exact_spectrum
 from tests.properties.examples import share_of_examples
 from tests.reference.exact_shafts.exact_response import frequency_response
 from tests.reference.exact_shafts.line import Section, SectionLine

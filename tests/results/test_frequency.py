@@ -264,3 +264,16 @@ def test_the_largest_finite_value_of_a_response_is_named_beside_a_resonance_howe
     assert response.infinite == (f,)
     assert 0 < response.magnitude[1] < 0.01
     assert f"largest {response.magnitude[1]:.6g} at 100000 Hz; infinite at" in str(response)
+
+
+def test_small_motions_of_many_columns_are_not_taken_for_the_motion_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A long trajectory is read in blocks of times; deviations from a point must not be read as such a one."""
+    net = sw.Network("driven chain")
+    net.add(sw.TorqueSource("motor", tau=5.0), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    shaft = sw.Shaft("line", length=1.0, diameter=0.02, density=7900.0, shear_modulus=77.5e9, model=sw.Lumped(20))
+    net.add(shaft, "a", "b")
+    model = net.compile()
+    whole = model.linearize(outputs=("line.tau_a", "J.omega")).C
+    monkeypatch.setattr("shaftwork.codegen.array_form.elements.AT_ONCE", 100)
+    np.testing.assert_array_equal(model.linearize(outputs=("line.tau_a", "J.omega")).C, whole)

@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 
 import shaftwork as sw
 from shaftwork.results.course import turning_points
-from shaftwork.results.fatigue import damage
-from shaftwork.results.rainflow import Rainflow, rainflow
+from shaftwork.results.fatigue import Rainflow, damage, rainflow
 
 LINE = sw.SNLine(amplitude=100.0, cycles=1e6, slope=5.0)
 

@@ -85,7 +85,7 @@ def test_the_command_tells_on_standard_error(tmp_path: Path, capsys: pytest.Capt
 @pytest.mark.slow
 def test_a_shaft_of_travelling_waves_tells_of_its_stations() -> None:
     """A step runs along a shaft of 1 m in 0.3 ms; output times are thrice as far apart."""
-    from shaftwork.results.samples import warn_of_coarse_samples
+    from shaftwork.results.extremes import warn_of_coarse_samples
 
     net = sw.Network("waves")
     net.add(sw.TorqueSource("push", tau=TORQUE), "a")

@@ -133,6 +133,25 @@ def test_tables_hold_the_named_quantities_with_units(sol: sw.Solution) -> None:
     assert data.attrs["engine"] == sol.engine
 
 
+def test_tables_hold_a_quantity_along_a_shaft_at_each_of_its_places() -> None:
+    net = sw.Network("line")
+    net.add(sw.TorqueSource("motor", tau=5.0), "a")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    shaft = sw.Shaft("line", length=1.0, diameter=0.02, density=7900.0, shear_modulus=77.5e9, model=sw.Lumped(4))
+    net.add(shaft, "a", "b")
+    net.add(sw.Inertia("J2", J=1.0), "b")
+    line = net.simulate(0.01, t_eval=11)
+    frame = line.to_pandas("line.tau", "J1.omega")
+    assert list(frame.columns) == [*(f"line.tau at {place:g} m" for place in line.places["line.tau"]), "J1.omega"]
+    np.testing.assert_array_equal(frame.to_numpy()[:, :-1], line["line.tau"])
+    data = line.to_xarray("line.tau", "J1.omega")
+    assert data["line.tau"].dims == ("t", "line.tau.x")
+    assert data["line.tau"].attrs["units"] == "N*m"
+    np.testing.assert_array_equal(data["line.tau.x"], line.places["line.tau"])
+    np.testing.assert_array_equal(data["line.tau"], line["line.tau"])
+    assert data["J1.omega"].dims == ("t",)
+
+
 def test_curves_share_an_axis_by_unit(sol: sw.Solution) -> None:
     figure = sol.plot("shaft.tau", "motor.tau", "J2.omega")
     assert [axis.get_ylabel() for axis in figure.axes] == ["N*m", "rad/s", ""]  # the last one shows the phases

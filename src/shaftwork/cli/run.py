@@ -141,7 +141,7 @@ def _say_phases(solution: Solution, say: Say) -> None:
 def _write(solution: Solution, signals: Sequence[str], place: Path) -> None:
     import numpy as np
 
-    from shaftwork.results.samples import warn_of_coarse_samples
+    from shaftwork.results.extremes import warn_of_coarse_samples
 
     warn_of_coarse_samples(solution.reader, solution.t, solution.x, signals)
     units, profiles = solution.observer.units, solution.observer.profiles

@@ -18,8 +18,7 @@ from scipy.sparse.linalg import ArpackError, LinearOperator, eigs, splu
 
 from shaftwork.core.errors import ParameterError, SimulationError
 from shaftwork.core.notices import hint
-from shaftwork.frequency.model_slopes import Complex
-from shaftwork.results.observer import Array
+from shaftwork.results.observer import Array, Complex
 
 LARGEST_DENSE = 1500
 """States up to which all eigenvalues are computed."""

@@ -13,8 +13,9 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from shaftwork.core.errors import ParameterError, SignalError, no_quantity
-from shaftwork.frequency.model_slopes import Complex, DeviationEquations, Motions
-from shaftwork.results.observer import Array, array_in_si, blocks
+from shaftwork.frequency.exact_lines import Motions
+from shaftwork.frequency.linearization import Linearization
+from shaftwork.results.observer import Array, Complex, array_in_si, blocks
 from shaftwork.results.plotting import new_figure
 
 if TYPE_CHECKING:
@@ -200,7 +201,7 @@ class _Response:
 class StateEquations:
     """(s I - A) x = (B + s B1) v, in states of equal units."""
 
-    def __init__(self, slopes: DeviationEquations) -> None:
+    def __init__(self, slopes: Linearization) -> None:
         scale, weights = sparse.diags_array(slopes.weights), slopes.weights[:, None]
         self._matrix = sparse.csc_array(scale @ slopes.A @ sparse.diags_array(1 / slopes.weights))
         self._level, self._rate = weights * slopes.B, weights * slopes.B1

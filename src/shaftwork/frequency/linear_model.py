@@ -13,11 +13,10 @@ from scipy import sparse
 
 from shaftwork.core.errors import no_quantity
 from shaftwork.core.screen import counted
-from shaftwork.frequency.exact_shafts.exact_lines import ExactSlopes
-from shaftwork.frequency.exact_shafts.exact_problem import ExactProblem
-from shaftwork.frequency.exact_shafts.exact_spectrum import Starts, find_exact_modes
+from shaftwork.frequency.exact_lines import ExactSlopes
+from shaftwork.frequency.exact_spectrum import ExactProblem, Starts, find_exact_modes
 from shaftwork.frequency.frequency_response import FrequencyResponse, StateEquations, frequency_response
-from shaftwork.frequency.model_slopes import DeviationEquations
+from shaftwork.frequency.linearization import Linearization
 from shaftwork.frequency.natural_modes import Modes, find_modes
 from shaftwork.results.observer import Array
 
@@ -54,7 +53,7 @@ class LinearModel:
     outputs: tuple[str, ...]
     point: Mapping[str, float]
     t: float
-    slopes: DeviationEquations
+    slopes: Linearization
     phase: str = ""
 
     @property
@@ -203,7 +202,7 @@ class ExactModel:
 
 
 def linear_model(
-    title: str, slopes: DeviationEquations, outputs: tuple[str, ...] | None, x: Array, t: float, phase: str = ""
+    title: str, slopes: Linearization, outputs: tuple[str, ...] | None, x: Array, t: float, phase: str = ""
 ) -> LinearModel:
     """The record of a network near a point.
 

@@ -30,8 +30,8 @@ from shaftwork.formulation.form import StateForm
 from shaftwork.formulation.source_inputs import places_of, with_inputs
 from shaftwork.network.graph import GROUND, GraphPart
 from shaftwork.network.kinds import Kind
+from shaftwork.results.observer import Complex
 
-Complex = NDArray[np.complexfloating[Any, Any]]
 NEARBY = 1e-9
 """A law is looked at so far to both sides of the point, as a fraction of it, to see whether it jumps there."""
 JUMP = 1e-3
@@ -95,7 +95,7 @@ class Linearization:
         self._by_state, self._by_input = _input_slopes(self._bound, t, x, self._enter)
         self.A = sparse.csr_array(part.A + part.B @ self._by_state)
         self.B = (part.B @ self._by_input).toarray()
-        self.B1 = (part.B1 @ self._enter).toarray()
+        self.B1: Array = (part.B1 @ self._enter).toarray()
         ends = [form.outputs.index(branch) for branch in form.waves]
         self.C = sparse.csr_array(part.C[ends] + part.D[ends] @ self._by_state)
         self.D = (part.D[ends] @ self._by_input).toarray()
@@ -299,8 +299,8 @@ class _Reader(ModelObserver):
 
     motion: BranchHistory
 
-    def history(self, t: Array, x: Array) -> BranchHistory:  # noqa: ARG002 (they are those of the motion)
-        return self.motion
+    def _read(self, t: Array, x: Array, read: Callable[[BranchHistory], Array]) -> Array:  # noqa: ARG002 (as of the motion)
+        return read(self.motion)
 
     def signal(self, name: str, t: Array, x: Array, dense: DenseWaves | None = None) -> Array:
         """(k,) a quantity by its name in `units`; the energy of a part is that in its stores, lines apart."""

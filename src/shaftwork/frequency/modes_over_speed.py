@@ -9,14 +9,11 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import brentq, linear_sum_assignment
 
-from shaftwork.frequency.model_slopes import Complex
-from shaftwork.frequency.natural_modes import Modes, natural_frequencies
-from shaftwork.results.observer import Array
+from shaftwork.frequency.natural_modes import EQUAL, Modes, natural_frequencies
+from shaftwork.results.observer import Array, Complex
 
 REFINED = 1e-12
 """To this fraction a speed is found that is sought."""
-MET = 1e-6
-"""An order meets a frequency that is as near as this fraction; at a jump of the frequencies it passes between two."""
 HALVINGS, NARROW = 40, 1e-6
 """An interval in which the phase changes is halved so often at most, and down to this fraction of its width."""
 BEYOND = 1.2
@@ -173,7 +170,7 @@ class OverSpeed:
                 at = self._refined(left, right, order, rank)
                 if not _goes_on(left, at, rank):
                     stranger = at
-                elif abs(at.above(order)[rank]) <= MET * at.frequencies[rank]:
+                elif abs(at.above(order)[rank]) <= EQUAL * at.frequencies[rank]:  # it jumps past an order between two
                     meetings.append(Meeting(at.speed, at, order, rank))
         return meetings, stranger
 

@@ -15,17 +15,19 @@ from shaftwork.core.errors import ParameterError, no_quantity
 from shaftwork.core.parameters import in_si, whole
 from shaftwork.core.screen import counted
 from shaftwork.frequency.eigenvalues import eigenmodes
-from shaftwork.frequency.model_slopes import Complex, DeviationEquations, Motions
-from shaftwork.results.observer import Array
+from shaftwork.frequency.exact_lines import Motions
+from shaftwork.frequency.linearization import Linearization
+from shaftwork.results.observer import Array, Complex
 from shaftwork.results.plotting import new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 EQUAL = 1e-6
-"""Amplitudes that differ by less than this fraction are equal: the first of them is the reference of the shape."""
+"""Amplitudes, rates and frequencies that differ by less than this fraction are equal: of several largest amplitudes the
+first is the reference of the shape."""
 MOVES = 1e-9
-"""A node takes part in a mode when its amplitude is more than this fraction of the largest."""
+"""A node moves when its amplitude, or speed, is more than this fraction of the largest."""
 SHOWN, LABELS = 6, 20
 """Modes in a picture when nobody says which, and the most nodes that are named under it."""
 
@@ -129,7 +131,7 @@ class _Shapes(Mapping[str, Complex]):
         return len({**self._slopes.units, **self._slopes.profiles})
 
 
-def find_modes(title: str, slopes: DeviationEquations, count: int | None = None, f_max: float | None = None) -> Modes:
+def find_modes(title: str, slopes: Linearization, count: int | None = None, f_max: float | None = None) -> Modes:
     """The modes of a network near a point, the eigenvalues and eigenvectors of A; see `LinearModel.modes`."""
     count, top = checked_count(count), largest_rate(f_max)
     acting, following = states_that_act(slopes.angles, slopes.A)

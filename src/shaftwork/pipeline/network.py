@@ -233,7 +233,7 @@ class Network(NetworkBuilder):
 
     @staticmethod
     def _small_motions(model: Model, *, exact: bool) -> SmallMotions:
-        from shaftwork.frequency.exact_shafts.exact_networks import small_motions
+        from shaftwork.frequency.exact_networks import small_motions
 
         return small_motions(model, Compiler((), LOOP), every=exact)
 

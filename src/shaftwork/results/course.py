@@ -1,25 +1,37 @@
-"""A quantity over a motion as polynomials of degree 7 on parted panels of time, with its extremes and turning points.
+"""A quantity over a motion on parted panels of time: polynomials with their extremes and turning points, and integrals.
 
-Law: a panel's polynomial goes through the values at Lobatto's eight points. Where it follows the quantity its Chebyshev
-coefficients fall, and the last of them say what it misses. Source: Trefethen, Approximation Theory and Approximation
-Practice, chapters 3 and 8.
+Law: a panel's polynomial, of degree 7, goes through the values at Lobatto's eight points. Where it follows the quantity
+its Chebyshev coefficients fall, and the last of them say what it misses. Integrals are those of Lobatto's rule, to
+rounding, in panels that are parted where that still changes something. Source: Trefethen, Approximation Theory and
+Approximation Practice, chapters 3 and 8.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any, ClassVar, Self
 
 import numpy as np
+from numpy.polynomial.polynomial import polyval
 from numpy.typing import NDArray
 
-from shaftwork.numerics.polynomials import chebyshev_nodes, to_chebyshev, to_powers
+from shaftwork.numerics.polynomials import chebyshev_nodes, lobatto_rule, to_chebyshev, to_powers, to_slopes
 from shaftwork.numerics.zeros import Chosen, zeros
-from shaftwork.results.observer import Array, blocks
-from shaftwork.results.quadrature import NODES, SHARE, LobattoPanels
-from shaftwork.results.reader import Read
+from shaftwork.results.observer import Array, Read, blocks
 
-Mask = NDArray[np.bool_]
-
+NODES, WEIGHTS = lobatto_rule(7)
+"""Of Lobatto's rule, which reads both ends: there peaks are, and a jump close to an end is not overlooked."""
+LEAST = 64
+"""Panels of a run at least: an exact engine has few steps."""
+TIGHT = 1e-13
+"""Change of an integral by parting all panels that is none, as a fraction of the integral of the integrand's size."""
+MOST_INTEGRATED = 100_000
+"""Panels of an integral; a motion that asks for more, such as torque of mere noise, is integrated as far as that."""
+SHARE = 0.41
+"""Of a panel is the first of its two parts: of a jump in the middle, halves and the whole would say the same."""
+NOISE, FALLS, GROWS = 1e-9, 0.75, 1.5
+"""Changes below the first fraction are noise where parting leaves this share of them, and so many times the panels."""
 ROUGH, FINE, EVEN = 1e-3, 1e-9, 1e-6
 """Of the range: what a polynomial may miss anywhere, where it may hold an extreme, and where all turns are wanted.
 
@@ -44,6 +56,8 @@ SMALLEST = 1e-6
 LATER = 1e-3
 """A peak that is higher by this fraction of what counts as a change is no later one."""
 
+Mask = NDArray[np.bool_]
+_RATES = to_slopes(NODES, NODES)
 _DEGREE = len(NODES) - 1
 _TAILS = to_chebyshev(NODES)[-TAIL:]
 _POWERS = to_powers(NODES)
@@ -53,6 +67,147 @@ _VALUES_THERE = np.vander(LOOKS, _DEGREE + 1, increasing=True) @ _POWERS
 _SLOPES_THERE = np.vander(LOOKS, _DEGREE, increasing=True) @ _SLOPES
 _BETWEEN = 1.0 / np.cos(0.5 * np.pi * _DEGREE / (len(LOOKS) - 1))
 """No polynomial of this degree is larger between the looks by more than this factor (Ehlich and Zeller, 1964)."""
+
+
+@dataclass(frozen=True, eq=False)
+class LobattoPanels:
+    """Parts of a span of time, each with the nodes of Lobatto's rule.
+
+    Args:
+        start: (p,) ascending, s.
+        end: (p,) s.
+    """
+
+    start: Array
+    end: Array
+    nodes: ClassVar[Array] = NODES
+    weights: ClassVar[Array] = WEIGHTS
+
+    @classmethod
+    def between(cls, edges: Array) -> Self:
+        """Panels from each time to the next, s."""
+        return cls(edges[:-1], edges[1:])
+
+    @classmethod
+    def joined(cls, parts: Sequence[LobattoPanels]) -> tuple[Self, NDArray[np.intp]]:
+        """The panels of all parts, ascending, and their order."""
+        start, end = (np.concatenate([getattr(part, side) for part in parts]) for side in ("start", "end"))
+        order = np.argsort(start, kind="stable")
+        return cls(start[order], end[order]), order
+
+    @property
+    def length(self) -> Array:
+        """(p,) s."""
+        return self.end - self.start
+
+    @property
+    def times(self) -> Array:
+        """(p, 8) nodes, ascending, s; the last a rounding before the end, where another panel may begin with a jump."""
+        times: Array = self.start[:, None] + self.length[:, None] * (NODES + 1) / 2
+        times[:, -1] = np.nextafter(self.end, self.start)
+        return times
+
+    def parted(self) -> Self:
+        """Two panels for each."""
+        middle = self.start + SHARE * self.length
+        start, end = np.stack([self.start, middle], axis=1), np.stack([middle, self.end], axis=1)
+        return type(self)(start.ravel(), end.ravel())
+
+    def split(self, times: Array) -> LobattoPanels:
+        """Panels that also end at times (k,) inside the span, which they fill without gaps."""
+        start = np.unique(np.append(self.start, times))
+        return LobattoPanels(start, np.append(start[1:], self.end[-1]))
+
+    def integrals(self, values: Array) -> Array:
+        """(..., p) integrals over each panel of values (..., p, 8) at the nodes."""
+        return np.asarray(values @ self.weights * self.length / 2)
+
+    def slopes(self, values: Array) -> Array:
+        """(p, 8) derivatives by time of the polynomials through values (p, 8)."""
+        return np.asarray(values @ _RATES.T * 2 / self.length[:, None])
+
+    def taken(self, which: NDArray[Any] | slice) -> Self:
+        """Some of them, marked or numbered."""
+        return type(self)(self.start[which], self.end[which])
+
+
+class GaussPanels(LobattoPanels):
+    """Parts of a span of time with the nodes of Gauss' rule, which reads no ends: there a power may have no value."""
+
+    nodes, weights = np.polynomial.legendre.leggauss(len(NODES))
+
+    @property
+    def times(self) -> Array:
+        """(p, 8) nodes, ascending, s."""
+        return np.asarray(self.start[:, None] + self.length[:, None] * (self.nodes + 1) / 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Integrals:
+    """Integrals of m quantities over panels in which all of them are smooth.
+
+    Args:
+        panels: p of them, ascending, without gaps.
+        values: (m, p) over each panel.
+        sizes: (m, p) those of the size of each quantity.
+    """
+
+    panels: LobattoPanels
+    values: Array
+    sizes: Array
+
+    @property
+    def totals(self) -> Array:
+        """(m,) over the run."""
+        return np.asarray(self.values.sum(axis=1))
+
+
+def integrate(
+    integrand: Callable[[LobattoPanels], Array],
+    steps: Array,
+    *,
+    rule: type[LobattoPanels] = LobattoPanels,
+    alike: bool = False,
+    size: float = 0.0,
+) -> Integrals:
+    """Integrals of several quantities over a run.
+
+    A kink or a jump within a step is closed in by parting; the ends of steps are ends of panels.
+
+    Args:
+        integrand: (m, p, 8) the quantities at the nodes of panels.
+        steps: (s,) times between which the motion is smooth, s.
+        rule: the panels.
+        alike: whether the quantities are of one kind: what is little beside the largest need not be known better.
+        size: the largest integral of a size over what was before, beside which it need not be known better either.
+    """
+    least = max(1, LEAST // len(steps))
+    edges = np.append((steps[:-1, None] + np.diff(steps)[:, None] * np.arange(least) / least).ravel(), steps[-1])
+    panels = rule.between(edges)
+    shortest = SHORTEST * np.spacing(np.abs(steps).max())
+    whole, first, count, before = panels.integrals(integrand(panels)), len(panels.start), 0, (np.inf, 0)
+    scales = np.full(len(whole), max(size, float(np.finfo(float).tiny)))
+    settled: list[tuple[LobattoPanels, Array, Array]] = []
+    while len(panels.start):
+        parts = panels.parted()
+        values = integrand(parts)
+        fine, sizes = parts.integrals(values), parts.integrals(np.abs(values))
+        change = np.abs(fine.reshape(len(fine), -1, 2).sum(axis=2) - whole)
+        scale = (scales + sizes.sum(axis=1))[:, None]
+        scale = scale.max(axis=0, keepdims=True, initial=0.0) if alike else scale
+        rough, open_ = float((change / scale).sum(axis=1).max(initial=0.0)), len(panels.start)
+        count += 2 * open_
+        noisy = FALLS * before[0] < rough <= NOISE and open_ > GROWS * before[1]
+        done = (change <= TIGHT * scale / first).all(axis=0) | (panels.length <= shortest)
+        if rough <= TIGHT or count > MOST_INTEGRATED or noisy:
+            done[:] = True
+        done = np.repeat(done, 2)
+        scales += sizes[:, done].sum(axis=1)
+        settled.append((parts.taken(done), fine[:, done], sizes[:, done]))
+        panels, whole, before = parts.taken(~done), fine[:, ~done], (rough, open_)
+    panels, order = rule.joined([part for part, *_ in settled])
+    values, sizes = (np.concatenate([one[k] for one in settled], axis=1)[:, order] for k in (1, 2))
+    return Integrals(panels, values, sizes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,18 +323,13 @@ def _turns(values: Array, low: Array, high: Array) -> Array:
     """Where in their panels polynomials through values (k, 8) turn between two places."""
     slope, bend = values @ _SLOPES.T, values @ _BENDS.T
 
+    def at(powers: Array, places: Array) -> Array:
+        return np.asarray(polyval(places, powers.T, tensor=False))
+
     def slopes(chosen: Chosen, places: Array) -> tuple[Array, Array]:
-        return _at(slope[chosen], places), _at(bend[chosen], places)
+        return at(slope[chosen], places), at(bend[chosen], places)
 
-    return zeros(slopes, low, high, rising=_at(slope, low) <= 0, iterations=NEWTON)
-
-
-def _at(powers: Array, places: Array) -> Array:
-    """Polynomials (k, d), their lowest power first, each at a place (k,)."""
-    value = powers[:, -1]
-    for column in powers.T[-2::-1]:
-        value = value * places + column
-    return np.asarray(value)
+    return zeros(slopes, low, high, rising=at(slope, low) <= 0, iterations=NEWTON)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,17 +10,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shaftwork.results.course import NODES, GaussPanels, LobattoPanels, integrate
 from shaftwork.results.observer import Array, DenseStates, Observer, blocks
-
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(12)
-"""Gauss points in one panel, from -1 to 1, and their weights."""
-TIGHT = 1e-13
-"""A panel is halved until its work changes by less than this fraction of the mean work of a step."""
-HALVINGS = 7
-NOISE, FALLS = 1e-11, 0.75
-"""Changes below the first fraction are noise where halving leaves more than this share of them."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +57,7 @@ class EnergyBalance:
 
 
 def energy_balance(observer: Observer, dense: DenseStates, steps: Array) -> EnergyBalance:
-    """Integrate the powers over every step with Gauss' formula, on panels halved until their work no longer changes.
+    """Integrate the powers over every step.
 
     The run is read in blocks of steps, so that the memory that it takes does not grow with the number of steps.
 
@@ -76,15 +68,35 @@ def energy_balance(observer: Observer, dense: DenseStates, steps: Array) -> Ener
     """
     before, after = _stored_on_both_sides(observer, dense, steps)
     impulses, hits, at_once = _impulses(observer.impacts(dense), steps, after - before)
-    flow = _Work(observer, dense, steps)
+    lost, supplied = (tuple(by_part) for by_part in observer.powers(steps[:1], dense(steps[:1])))
+
+    def powers(panels: LobattoPanels) -> Array:
+        times = panels.times.ravel()
+        rows = [power for by_part in observer.powers(times, dense(times)) for power in by_part.values()]
+        return np.array(rows).reshape(len(rows), *panels.times.shape)
+
+    count = len(lost) + len(supplied)
+    by_step, totals, sizes = np.zeros((2, len(steps))), np.zeros(count), np.zeros(count)
+    losses, supplies = slice(len(lost)), slice(len(lost), None)
+    for block in blocks(len(steps) - 1, 2 * len(NODES) * _width(observer, dense, steps)):  # of both parts of each
+        ends = slice(block.start, block.stop + 1)
+        flow = integrate(powers, steps[ends], rule=GaussPanels, alike=True, size=float(sizes.max(initial=0.0)))
+        inside = np.searchsorted(steps[ends], flow.panels.start, side="right")  # the end of the step of each panel
+        rows = [flow.values[part].sum(axis=0) for part in (losses, supplies)]
+        by_step[:, ends] += [np.bincount(inside, row, minlength=len(steps[ends])) for row in rows]
+        totals += flow.totals
+        sizes += flow.sizes.sum(axis=1)
     return EnergyBalance(
         t=steps,
         stored=after,
-        supplied=flow.supplied + np.cumsum(impulses),
-        lost=flow.lost + np.cumsum(_total(hits, len(steps))),
-        work=flow.work + float(np.abs(impulses).sum()),
-        lost_in=_sums(flow.lost_in, {part: float(energy.sum()) for part, energy in hits.items()}),
-        supplied_by=_sums(flow.supplied_by, at_once),
+        supplied=np.cumsum(by_step[1] + impulses),
+        lost=np.cumsum(by_step[0] + _total(hits, len(steps))),
+        work=float(sizes[supplies].sum() + np.abs(impulses).sum()),
+        lost_in=_sums(
+            dict(zip(lost, totals[losses].tolist(), strict=True)),
+            {part: float(energy.sum()) for part, energy in hits.items()},
+        ),
+        supplied_by=_sums(dict(zip(supplied, totals[supplies].tolist(), strict=True)), at_once),
     )
 
 
@@ -133,122 +145,5 @@ def _width(observer: Observer, dense: DenseStates, steps: Array) -> int:
     return int(dense(steps[:1]).shape[1]) + 2 * len(observer.wiring)
 
 
-class _Work:
-    """What goes through the parts: running sums (s,), and totals by part.
-
-    Args:
-        observer: of the model.
-        dense: the motion.
-        steps: (s,) times.
-    """
-
-    def __init__(self, observer: Observer, dense: DenseStates, steps: Array) -> None:
-        self._observer, self._dense = observer, dense
-        self._rows = _width(observer, dense, steps) * len(NODES)
-        self._by_step = np.zeros((2, len(steps) - 1))
-        self.work, self.lost_in, self.supplied_by = 0.0, dict[str, float](), dict[str, float]()
-        panels = _Panels(np.arange(len(steps) - 1), steps[:-1], np.diff(steps))
-        whole, turnover = np.zeros_like(self._by_step), 0.0
-        for block in blocks(len(panels.step), self._rows):
-            part = panels.taken(block)
-            powers = self._powers(part)
-            whole[:, block] = part.works(powers)
-            turnover += part.turnover(powers[1])
-        self._each = max(turnover, float(np.abs(np.cumsum(whole[0])).max(initial=0.0))) / len(steps)
-        self._settle(panels, whole, np.full(len(panels.step), np.inf), HALVINGS)
-
-    @property
-    def lost(self) -> Array:
-        """(s,) heat since the start, J."""
-        return np.append(0.0, np.cumsum(self._by_step[0]))
-
-    @property
-    def supplied(self) -> Array:
-        """(s,) work of the sources since the start, J."""
-        return np.append(0.0, np.cumsum(self._by_step[1]))
-
-    def _powers(self, panels: _Panels) -> tuple[dict[str, Array], dict[str, Array]]:
-        """(p, 12) lost and supplied power by part at the nodes of panels."""
-        times = panels.times.ravel()
-        lost, supplied = self._observer.powers(times, self._dense(times))
-        shape = panels.times.shape
-        first, second = ({name: power.reshape(shape) for name, power in by.items()} for by in (lost, supplied))
-        return first, second
-
-    def _settle(self, panels: _Panels, whole: Array, before: Array, halvings: int) -> None:
-        """Add the work of panels; of each the halves, and theirs in turn where the work still changes by that.
-
-        Args:
-            panels: p of them.
-            whole: (2, p) lost and supplied work of each by its own nodes, J.
-            before: (p,) by how much the work of that changed which each is a half of, J.
-            halvings: so many at most.
-        """
-        for block in blocks(len(panels.step), 2 * self._rows):
-            halves = panels.taken(block).halved()
-            powers = self._powers(halves)
-            parts = halves.works(powers)
-            change = np.abs(parts.reshape(2, -1, 2).sum(axis=2) - whole[:, block]).sum(axis=0)
-            noisy = (change > FALLS * before[block]) & (change <= NOISE * self._each)
-            still = (change > TIGHT * self._each) & ~noisy if halvings > 1 else np.zeros(len(change), dtype=bool)
-            open_ = np.repeat(still, 2)
-            settled = ({name: power[~open_] for name, power in by_part.items()} for by_part in powers)
-            self._add(halves.taken(~open_), *settled)
-            if still.any():
-                self._settle(halves.taken(open_), parts[:, open_], np.repeat(change, 2)[open_], halvings - 1)
-
-    def _add(self, panels: _Panels, lost: Mapping[str, Array], supplied: Mapping[str, Array]) -> None:
-        """Add the work of panels from the powers (p, 12) at their nodes."""
-        for row, powers, totals in ((0, lost, self.lost_in), (1, supplied, self.supplied_by)):
-            for name, power in powers.items():
-                work = panels.integrals(power)
-                np.add.at(self._by_step[row], panels.step, work)
-                totals[name] = totals.get(name, 0.0) + float(work.sum())
-        self.work += panels.turnover(supplied)
-
-
-@dataclass(frozen=True, eq=False)
-class _Panels:
-    """Parts of steps, ascending.
-
-    Args:
-        step: (p,) numbers of their steps.
-        start: (p,) s.
-        length: (p,) s.
-    """
-
-    step: NDArray[np.intp]
-    start: Array
-    length: Array
-
-    @property
-    def times(self) -> Array:
-        """(p, 12) nodes of Gauss' formula, s."""
-        times: Array = self.start[:, None] + self.length[:, None] * (NODES + 1) / 2
-        return times
-
-    def integrals(self, values: Array) -> Array:
-        """(p,) over each of values (p, 12) at the nodes."""
-        return np.asarray(values @ WEIGHTS * self.length / 2)
-
-    def works(self, powers: Iterable[Mapping[str, Array]]) -> Array:
-        """(2, p) integrals over each of all that is lost and of all that is supplied, from powers (p, 12) by part."""
-        return np.stack([self.integrals(_total(by_part, self.times.shape)) for by_part in powers])
-
-    def turnover(self, supplied: Mapping[str, Array]) -> float:
-        """The integral over all of them of the sizes of supplied powers (p, 12)."""
-        return sum(float(self.integrals(np.abs(power)).sum()) for power in supplied.values())
-
-    def halved(self) -> _Panels:
-        """Two for each."""
-        start, half = np.repeat(self.start, 2), np.repeat(self.length / 2, 2)
-        start[1::2] += half[1::2]
-        return _Panels(np.repeat(self.step, 2), start, half)
-
-    def taken(self, which: slice | NDArray[np.bool_]) -> _Panels:
-        """Some of them."""
-        return _Panels(self.step[which], self.start[which], self.length[which])
-
-
-def _total(by_part: Mapping[str, Array], shape: int | tuple[int, ...]) -> Array:
+def _total(by_part: Mapping[str, Array], shape: int) -> Array:
     return np.asarray(sum(by_part.values(), start=np.zeros(shape)))

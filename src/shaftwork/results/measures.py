@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from shaftwork.core.errors import ParameterError
+from shaftwork.results.course import LobattoPanels, integrate
 from shaftwork.results.fatigue import SNLine
-from shaftwork.results.observer import Array
-from shaftwork.results.quadrature import LobattoPanels, integrate
-from shaftwork.results.reader import Read
+from shaftwork.results.observer import Array, Read
 from shaftwork.results.solution import Solution
 
 KINDS: Mapping[str, str] = {
@@ -24,6 +23,10 @@ KINDS: Mapping[str, str] = {
     "damage": "the share of the life that the motion takes, with `sn`",
 }
 """What a measure may say of a quantity."""
+POWERS: Mapping[str, int] = {"mean": 1, "rms": 2}
+"""Of the quantity, in the integral that makes a measure."""
+EXTREMES: Mapping[str, tuple[float, ...]] = {"max": (1.0,), "min": (-1.0,), "peak": (1.0, -1.0)}
+"""Measures that are the largest value of a quantity, times these signs."""
 
 
 @dataclass(frozen=True)
@@ -73,10 +76,10 @@ class Measure:
         if self.kind == "end":
             values = solution.at(solution.steps[-1:])[self.quantity].ravel()
             return float(values[np.abs(values).argmax()])
-        if self.kind in ("max", "min", "peak"):
+        if self.kind in EXTREMES:
             least, most = solution.extremes[self.quantity]
             return float({"max": most, "min": least, "peak": max(most, -least)}[self.kind])
-        power, reader = 2 if self.kind == "rms" else 1, solution.reader
+        power, reader = POWERS[self.kind], solution.reader
         places = reader.numbers(self.quantity)
         return max((_mean(reader.quantity(self.quantity, place), reader.steps, power) for place in places), key=abs)
 
@@ -86,6 +89,5 @@ def _mean(read: Read, steps: Array, power: int) -> float:
         times = panels.times
         return (read(times.ravel()) ** power).reshape(1, *times.shape)
 
-    total, _ = integrate(integrand, steps)
-    mean = float(total[0] / (steps[-1] - steps[0]))
+    mean = float(integrate(integrand, steps).totals[0] / (steps[-1] - steps[0]))
     return float(np.sqrt(mean)) if power == 2 else mean

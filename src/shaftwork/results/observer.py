@@ -1,21 +1,37 @@
-"""What a solution needs to know of its model: plain arrays by name, no symbols."""
+"""What a solution needs to know of its model: plain arrays by name, no symbols. Its quantities at any times."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import reprlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from shaftwork.core.errors import AccuracyWarning, SignalError, no_quantity
+from shaftwork.core.notices import muted, warn
 from shaftwork.core.parameters import numbers_in_si
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complexfloating[Any, Any]]
 
 RPM = 30 / np.pi
 """1/min of a rad/s."""
 AT_ONCE = 4_000_000
 """Numbers that are read of a motion at once, 32 MB."""
+Read = Callable[[Array], Array]
+"""From ascending times (k,) to the values of a quantity there."""
+ASIDE = (1e-13, 1e-11, 1e-9, 1e-7, 1e-6)
+"""How far aside a value is looked for, of the time or of 1 s, and of a shorter run of that."""
+SAME = 1e-4
+"""A value that is the same but for this fraction of it at twice the distance is what the quantity goes to, to so many
+digits; one that falls as a power of the distance goes to zero where what that power leaves is below this fraction."""
+SLOWEST = 0.95
+"""Of a difference is left at half the distance, at most, where a power of the distance falls: the 13th root leaves so
+much, and what falls more slowly cannot be told from a pole of the logarithm."""
+ANGLES = ("phi", "s", "psi")
+"""Integrals of speeds and voltages, which are recorded when asked for."""
 
 
 def blocks(count: int, width: int) -> Iterator[slice]:
@@ -133,3 +149,167 @@ class DenseStates(Protocol):
     def __call__(self, times: Array) -> Array:
         """(k, n) states at times (k,)."""
         ...
+
+
+class Reader:
+    """Reads quantities of a motion; what many of them are read at, the first look at each, is solved for once.
+
+    Args:
+        title: of the network.
+        states: n names.
+        observer: recovers quantities from states.
+        dense: states (k, n) at any times (k,).
+    """
+
+    def __init__(self, title: str, states: tuple[str, ...], observer: Observer, dense: DenseStates) -> None:
+        self.title, self.states, self.observer, self.dense = title, states, observer, dense
+        self.steps = dense.steps
+        self._states_at: tuple[Array, Array] | None = None
+        self._profile: tuple[str, Array, Array] | None = None
+        self.unbounded: dict[tuple[str, int | None], dict[float, float]] = {}
+        """Values that are not finite, by the name of the quantity and its place, and by time in s."""
+
+    @property
+    def names(self) -> dict[str, None]:
+        """Every quantity that can be read, at a place or along a part, in order."""
+        return dict.fromkeys((*self.observer.units, *self.observer.profiles))
+
+    def unit(self, name: str) -> str:
+        """The unit of a quantity; empty for what is stored and has no other meaning.
+
+        Raises:
+            SignalError: there is no such quantity; the message lists what the part has.
+        """
+        units, profiles = self.observer.units, self.observer.profiles
+        if not isinstance(name, str):
+            some = ", ".join(tuple(units)[:6])
+            raise SignalError(
+                f"{reprlib.repr(name)} is no name of a quantity. '{self.title}' has {len(units)}, such as: {some}. "
+                "All of them are in `names`."
+            )
+        if name in profiles:
+            return profiles[name][0]
+        if name in units:
+            return units[name]
+        if name in self.states:
+            return ""
+        error = no_quantity(name, self.title, self.names)
+        owner, _, quantity = name.rpartition(".")
+        if quantity.partition("_")[0] in ANGLES and any(other.rpartition(".")[0] == owner for other in units):
+            raise SignalError(f"{error} An angle is recorded when asked for: net.compile(angles=['{owner}']).")
+        raise error
+
+    def places(self, name: str) -> tuple[float, ...]:
+        """Where a quantity is read along a part, m from its first end; empty for any other."""
+        profiles = self.observer.profiles
+        return profiles[name][1] if isinstance(name, str) and name in profiles else ()
+
+    def numbers(self, name: str) -> range | tuple[None]:
+        """The places of a quantity as `quantity` takes them."""
+        return range(len(self.places(name))) or (None,)
+
+    def values(self, name: str, t: Array, x: Array) -> Array:
+        """(k,) a quantity at times (k,) with states (k, n); (k, places) one along a part.
+
+        Where it has no value, as 0/0, it is what it goes to on the side of the next step; an `AccuracyWarning` says
+        where it goes to nothing finite.
+
+        Raises:
+            SignalError: there is no such quantity.
+        """
+        if isinstance(name, str) and name in self.states:
+            return x[:, self.states.index(name)].copy()
+        values = self._computed(name, t, x)
+        missing = ~np.isfinite(values)
+        if missing.any():
+            rows = missing.reshape(len(t), -1).any(axis=1)
+            limit, _ = beside(lambda times: self._computed(name, times, self.dense(times)), t[rows], self.steps)
+            values[rows] = np.where(missing[rows] & np.isfinite(limit), limit, values[rows])
+            self._warn_of_missing(name, t, values)
+        return values
+
+    def quantity(self, name: str, place: int | None = None) -> Read:
+        """A quantity by its name, of one that is read along a part that at a place, by its number.
+
+        Where it has no finite value, a value next to it stands for that; what it was is in `unbounded`.
+        """
+
+        def plain(times: Array) -> Array:
+            parts = blocks(len(times), len(self.states))
+            with muted(*((AccuracyWarning,) if (name, place) in self.unbounded else ())):  # it has been said
+                return np.concatenate([self._at(name, place, times[block]) for block in parts])
+
+        def read(times: Array) -> Array:
+            values = plain(times)
+            if (rows := np.flatnonzero(~np.isfinite(values))).size:
+                unbounded = self.unbounded.setdefault((name, place), {})
+                unbounded.update(zip(times[rows].tolist(), values[rows].tolist(), strict=True))
+                with muted(AccuracyWarning):
+                    values[rows] = beside(plain, times[rows], self.steps)[1]
+            return values
+
+        return read
+
+    def _at(self, name: str, place: int | None, times: Array) -> Array:
+        if self._states_at is None or not np.array_equal(self._states_at[0], times):
+            self._states_at = times.copy(), self.dense(times)
+        last, x = self._states_at
+        if place is None:
+            return self.values(name, last, x)
+        if self._profile is None or self._profile[0] != name or self._profile[1] is not last:
+            self._profile = name, last, self.values(name, last, x)
+        return self._profile[2][:, place]
+
+    def _computed(self, name: str, t: Array, x: Array) -> Array:
+        """A quantity as it is computed, which may be 0/0."""
+        self.unit(name)  # refuses a name that does not exist
+        along = name in self.observer.profiles
+        return (self.observer.profile if along else self.observer.signal)(name, t, x, self.dense)
+
+    def _warn_of_missing(self, name: str, t: Array, values: Array) -> None:
+        """Say where a quantity has no finite value."""
+        missing = ~np.isfinite(values).reshape(len(t), -1).all(axis=1)
+        if missing.any():
+            warn(
+                f"'{name}' of '{self.title}' has no finite value at t = {t[missing][0]:.6g} s, as where the slope "
+                "of a law, sqrt(t) at t = 0, is infinite. Its extremes hold it where it is infinite, its mean and "
+                "cycles the values beside it. Give the law a finite slope there.",
+                AccuracyWarning,
+            )
+
+
+def beside(read: Callable[[Array], Array], times: Array, steps: Array) -> tuple[Array, Array]:
+    """What a quantity goes to on the side of its step at times at which it has no finite value.
+
+    Args:
+        read: from ascending times (k,) to values (k, ...).
+        times: (k,) ascending, s.
+        steps: (s,) times between which the motion is smooth, s.
+
+    Returns:
+        (k, ...) the limits, not a number where there is none, and finite values next to the times.
+    """
+    scale = min(float(steps[-1] - steps[0]), 1.0) * np.maximum(np.abs(times), 1.0)
+    before = np.append(times[1:] == times[:-1], False)  # of a time listed twice the first is before what jumps there
+    following = np.append(steps, np.inf)[np.searchsorted(steps, times, side="right")]
+    side = np.where(before | (following - times <= 2 * ASIDE[0] * scale) | (times >= steps[-1]), -1.0, 1.0)
+    limit: Array = np.full_like(read(times), np.nan)
+    near = limit.copy()
+    for distance in ASIDE:
+        values = []
+        for part in (1, 2, 4):
+            aside = np.clip(times + side * part * distance * scale, steps[0], steps[-1])
+            order = np.argsort(aside, kind="stable")
+            values.append(np.empty_like(limit))
+            values[-1][order] = read(aside[order])
+        with np.errstate(invalid="ignore", divide="ignore"):
+            left = (values[1] - values[0]) / (values[2] - values[1])  # of each difference at half the distance
+            falls = (left > 0) & (left < SLOWEST)
+            goes_to = np.where(falls, values[0] - (values[1] - values[0]) * left / (1 - left), values[0])
+            settles = np.isnan(limit) & (np.abs(values[0] - values[1]) <= SAME * np.abs(values[0]))
+            vanishes = np.isnan(limit) & falls & (np.abs(goes_to) <= SAME * np.abs(values[0]))
+        limit[settles] = goes_to[settles]
+        limit[vanishes] = 0.0
+        empty = np.isnan(near) & np.isfinite(values[0])
+        near[empty] = values[0][empty]
+    return limit, near

@@ -10,8 +10,7 @@ import numpy as np
 from shaftwork.core.errors import MissingExtraError
 from shaftwork.core.screen import in_lines
 from shaftwork.results.course import course
-from shaftwork.results.observer import RPM, Array, PhaseRow
-from shaftwork.results.reader import Reader
+from shaftwork.results.observer import RPM, Array, PhaseRow, Reader
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -16,13 +16,10 @@ from shaftwork.core.screen import counted, named, on_one_screen
 from shaftwork.integrate.problem import TOLERATED, UNSURPRISING
 from shaftwork.results.course import SMALLEST
 from shaftwork.results.energy import EnergyBalance, energy_balance
-from shaftwork.results.extremes import Extreme, Extremes
-from shaftwork.results.fatigue import Damage, SNLine, damage_of, damages
-from shaftwork.results.observer import Array, DenseStates, Observer, PhaseRow, array_in_si
+from shaftwork.results.extremes import Extreme, Extremes, warn_of_coarse_samples
+from shaftwork.results.fatigue import Damage, Rainflow, SNLine, damage_of, damages, load_cycles
+from shaftwork.results.observer import Array, DenseStates, Observer, PhaseRow, Reader, array_in_si
 from shaftwork.results.plotting import plot_signals
-from shaftwork.results.rainflow import Rainflow, load_cycles
-from shaftwork.results.reader import Reader
-from shaftwork.results.samples import warn_of_coarse_samples
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -226,28 +223,42 @@ class Solution:
         return self.energy.residual
 
     def to_pandas(self, *names: str) -> pd.DataFrame:
-        """A table over time of the named quantities, by default of all (extra `data`).
+        """A table over time of the named quantities, by default of all that have one value at a time (extra `data`).
+
+        One along a shaft has a column for each place, "line.tau at 0.5 m".
 
         An `AccuracyWarning` says where output times are too far apart to show how the named quantities, or else the
         states, swing.
         """
         frame = imported("pandas", "data", "Solution.to_pandas()")
-        columns = {name: self[name] for name in names or self.names}
+        columns = {title: column for name in names or self.names for title, column in self._columns(name)}
         self._warn_of_coarse_samples(names)
         return frame.DataFrame(columns, index=frame.Index(self.t, name="t"))
 
-    def to_xarray(self, *names: str) -> xarray.Dataset:
-        """A data set over time of the named quantities, by default of all, with units (extra `data`).
+    def _columns(self, name: str) -> Iterator[tuple[str, Array]]:
+        """A quantity in columns (k,) with their titles."""
+        values = self[name]
+        if values.ndim == 1:
+            yield name, values
+        else:
+            yield from zip((f"{name} at {place:g} m" for place in self.places[name]), values.T, strict=True)
 
-        Warns as `to_pandas` does.
+    def to_xarray(self, *names: str) -> xarray.Dataset:
+        """A data set over time of the named quantities, as `to_pandas` takes them, with units (extra `data`).
+
+        One along a shaft has its places in m as second dimension, "line.tau.x". Warns as `to_pandas` does.
         """
         library = imported("xarray", "data", "Solution.to_xarray()")
-        units = self.observer.units
-        data = {name: ("t", self[name], {"units": units[name]}) for name in names or self.names}
-        time = ("t", self.t, {"units": "s"})
+        coords = {"t": ("t", self.t, {"units": "s"})}
+        data = {}
+        for name in names or self.names:
+            values, along = self[name], f"{name}.x"
+            if values.ndim > 1:
+                coords[along] = (along, self.places[name], {"units": "m"})
+            data[name] = (("t", along)[: values.ndim], values, {"units": self.reader.unit(name)})
         self._warn_of_coarse_samples(names)
         return library.Dataset(  # type: ignore[no-any-return]
-            data, coords={"t": time}, attrs={"title": self.name, "engine": self.engine, "why": self.why}
+            data, coords=coords, attrs={"title": self.name, "engine": self.engine, "why": self.why}
         )
 
     def plot(self, *names: str) -> Figure:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -13,19 +13,13 @@ from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.pipeline.model import Model
 from shaftwork.sensitivities.differentiation import Differentiated
-from shaftwork.sensitivities.legs import Leg
+from shaftwork.sensitivities.legs import LATE, SAME, Leg
 
 if TYPE_CHECKING:
     from shaftwork.hybrid.hybrid_state import Change
     from shaftwork.hybrid.modes.mode_equations import ModeEquations
     from shaftwork.hybrid.modes.mode_machines import ModeNames
     from shaftwork.hybrid.phases import Phases
-
-CLOSE = 1e-5
-"""The run took a path whose states differ from its own by no more than this part of their size: it meets hard stops
-late by what rounding moves them, which is much for what hardly moves any more."""
-ALIKE = 1e-10
-"""Paths lead to the same states where these differ by no more than this part of their size."""
 
 
 class _ModeStep(NamedTuple):
@@ -102,34 +96,28 @@ class SensitivityTransfer:
                 continue
             candidates.append((float((np.abs(states - end.after) / sizes).max(initial=0.0)), k, slopes))
         nearest = min((away for away, *_ in candidates), default=np.inf)
-        if nearest <= CLOSE:
-            return next((k, slopes) for away, k, slopes in candidates if away <= nearest + ALIKE)
+        if nearest <= LATE:
+            return next((k, slopes) for away, k, slopes in candidates if away <= nearest + SAME)
         names = ", ".join(dict.fromkeys(f"'{change.element.name}'" for change in changes)) or "parts"
         raise SimulationError(
             f"At t = {after.start:.9g} s {names} change together, and how the derivatives pass that is not known here. "
             "Take the difference of two variants, studies.sweep(...)."
         )
 
-    def _paths(self, before: Leg, after: Leg, changes: Sequence[Change]) -> Iterator[tuple[_ModeStep, ...]]:
+    def _paths(self, before: Leg, after: Leg, changes: Sequence[Change]) -> Iterable[tuple[_ModeStep, ...]]:
         """Paths to the modes that follow, the plainest first."""
-        seen: list[tuple[_ModeStep, ...]] = []
-        for every in (False, True):
-            for besides in (False, True):
-                steps = self._path(before.modes, after.modes, changes, every=every, besides=besides)
-                if steps not in seen:
-                    seen.append(steps)
-                    yield steps
+        paths = (self._path(before.modes, after.modes, changes, besides=besides) for besides in (False, True))
+        return dict.fromkeys(paths)
 
     def _path(
-        self, modes: ModeNames, last: ModeNames, changes: Sequence[Change], *, every: bool, besides: bool
+        self, modes: ModeNames, last: ModeNames, changes: Sequence[Change], *, besides: bool
     ) -> tuple[_ModeStep, ...]:
-        """One path.
+        """One path, on which each impact takes up what is stored, and in the end all changes together.
 
         Args:
             modes: before.
             last: after.
             changes: in their order.
-            every: each change takes up what is stored by itself; else impacts alone do, and in the end all.
             besides: in an impact other elements are already in the modes that follow.
         """
         from shaftwork.hybrid.modes.mode_machines import with_modes
@@ -140,7 +128,6 @@ class SensitivityTransfer:
             number = numbers[id(change.element)]
             if not change.impact:
                 modes = with_modes(modes, {number: change.after})
-                steps += [_ModeStep(modes)] if every else []
                 continue
             others = {numbers[id(later.element)]: later.after for later in changes[place + 1 :] if not later.impact}
             modes = with_modes(modes, {**(others if besides else {}), number: change.after})

@@ -25,10 +25,26 @@ from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.discontinuities import switches, switches_of
 from shaftwork.components.law_slopes import slope
 from shaftwork.components.laws import t as TIME
+from shaftwork.core.errors import CompileError
 from shaftwork.formulation.explicit_rows import Rows
 from shaftwork.formulation.form import State, StateForm
 from shaftwork.formulation.gains import Number, exact_of
 from shaftwork.formulation.observables import Observables
+from shaftwork.pipeline.prepared import EngineModel
+
+
+def rows_of(model: EngineModel) -> Rows:
+    """The symbolic equations of a model.
+
+    Raises:
+        CompileError: it has none.
+    """
+    if model.rows is None:
+        raise CompileError(
+            f"'{model.form.graph.name}' has no symbolic equations to differentiate: it is too large, too closely "
+            "coupled, or holds waves. Take fewer elements, such as model=Lumped(10), or differences of two runs."
+        )
+    return model.rows
 
 
 class Values:
@@ -65,7 +81,7 @@ class SlopeMatrix:
     """
 
     def __init__(self, rows: Rows, expressions: Sequence[Expr], symbols: Sequence[Symbol]) -> None:
-        self.shape = len(expressions), len(symbols)
+        self._rows, self.shape = rows, (len(expressions), len(symbols))
         self.entries = {
             (k, m): entry
             for k, expression in enumerate(expressions)
@@ -79,6 +95,14 @@ class SlopeMatrix:
         """(k, m) at a time in s, states (n,), parameters (p,)."""
         return np.asarray(self.along(np.array([t]), x[None, :], p)[0])
 
+    def differentiated(self, symbols: Sequence[Symbol], t: float, x: Array, p: Array) -> Array:
+        """(symbols, k, m) the derivatives of all entries by symbols, at a time in s, states (n,), parameters (p,)."""
+        matrices = np.zeros((len(symbols), *self.shape))
+        if self.entries:
+            rows, columns = np.array(list(self.entries)).T
+            matrices[:, rows, columns] = SlopeMatrix(self._rows, tuple(self.entries.values()), symbols)(t, x, p).T
+        return matrices
+
     def along(self, times: Array, states: Array, p: Array) -> Array:
         """(s, k, m) at times (s,) in s, states (s, n), parameters (p,)."""
         matrices = np.zeros((len(times), *self.shape))
@@ -86,32 +110,6 @@ class SlopeMatrix:
             rows, columns = np.array(list(self.entries)).T
             matrices[:, rows, columns] = self._values(times, states, p)
         return matrices
-
-
-class Derivatives:
-    """The Jacobian of state equations, and what parameters do to it and to the rates.
-
-    Args:
-        rows: the state equations.
-        parameters: symbols by which to differentiate.
-    """
-
-    def __init__(self, rows: Rows, parameters: Sequence[Symbol]) -> None:
-        self._rows, self.parameters = rows, tuple(parameters)
-        self.by_states = SlopeMatrix(rows, rows.rates, rows.states)
-        self.by_parameters = SlopeMatrix(rows, rows.rates, self.parameters)
-
-    @cached_property
-    def _of_jacobian(self) -> SlopeMatrix:
-        return SlopeMatrix(self._rows, tuple(self.by_states.entries.values()), self.parameters)
-
-    def jacobian_slopes(self, t: float, x: Array, p: Array) -> Array:
-        """(parameters, n, n) derivative of the Jacobian by each parameter, the states held."""
-        size = len(self._rows.states)
-        slopes = np.zeros((len(self.parameters), size, size))
-        for entry, (row, column) in zip(self._of_jacobian(t, x, p), self.by_states.entries, strict=True):
-            slopes[:, row, column] = entry
-        return slopes
 
 
 class StateTransferJacobian:

@@ -1,30 +1,52 @@
-"""A motion together with its derivatives by parameters, through all that changes on the way."""
+"""A motion together with its derivatives by parameters, through all that changes on the way.
+
+The variational equation is linear along a motion that is known, and is solved by Gauss collocation. All steps are made
+at once: a step takes Y to (1 + P) Y + Q, whatever Y is, so P and Q of every step come from one stack of linear systems,
+and only their products follow one after another.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from sympy import Expr, Symbol
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import AccuracyWarning, ParameterError, SimulationError
 from shaftwork.core.notices import warn
 from shaftwork.formulation.observables import Observables
+from shaftwork.numerics.polynomials import to_integrals
 from shaftwork.numerics.zeros import zero
 from shaftwork.pipeline.model import Model
+from shaftwork.results.observer import blocks
 from shaftwork.sensitivities.carrying import End, SensitivityTransfer
-from shaftwork.sensitivities.differentiable import rows_of
-from shaftwork.sensitivities.differentiation import Differentiated, ValueWithSlopes
-from shaftwork.sensitivities.legs import DifferentiatedMotion, Leg, parted
-from shaftwork.sensitivities.saltation import ADVICE, TOGETHER, Jump, JumpConditions, by_chance
-from shaftwork.sensitivities.variation import Coefficients, Variation, variation
+from shaftwork.sensitivities.differentiation import Differentiated, ValueWithSlopes, rows_of
+from shaftwork.sensitivities.legs import EXACT, SAME, DifferentiatedMotion, Leg, parted
+from shaftwork.sensitivities.saltation import ADVICE, Jump, JumpConditions, by_chance
 
 if TYPE_CHECKING:
     from shaftwork.hybrid.hybrid_state import Change
 
+STAGES = 6
+"""Of a step: order 12, and no stage on its ends, where laws jump."""
+CLOSER = 64
+"""Two halves are closer to the solution than their difference from the whole by more than this."""
+MOST_STEPS = 1_000_000
+EVERY = 8
+"""So many steps of the run are one at first: implicit, it need not follow what has died away."""
+
+Coefficients = Callable[[Array], tuple[Array, Array]]
+"""From times (k,) to A (k, N, n) and B (k, N, m) of Y' = A Y[:n] + B; rows behind the first n are mere integrals."""
+
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(STAGES)
+NODES = (_POINTS + 1) / 2
+# integrals from the start of a step to each node and to its end, from values at the nodes
+_TO_NODES, _TO_END = to_integrals(_POINTS) / 2, _WEIGHTS / 2
 ROUNDING = 1e-3
 """What a change of a parameter by all of itself does to a state is rounding below this part of the state's size."""
 DOUBTFUL = 1e-6
@@ -34,8 +56,131 @@ APART = 1e-3
 of the run for all of a parameter."""
 BESIDE = 1e-3
 """A quantity is looked at so far beside its extreme, in steps of the run, to see where it turns."""
-ON_IT = 1e-12
-"""What is so near to the end of a leg, as a part of the run, is at it and moves along with it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Variation:
+    """The solution of the variational equation over a span of time.
+
+    Args:
+        coefficients: A and B.
+        ends: (s,) ends of the steps, s.
+        values: (s, N, m) Y there.
+    """
+
+    coefficients: Coefficients
+    ends: Array
+    values: Array
+
+    def at(self, t: float) -> Array:
+        """(N, m) Y at a time in s."""
+        k = int(np.clip(np.searchsorted(self.ends, t, side="right") - 1, 0, len(self.ends) - 1))
+        length = t - self.ends[k]
+        if length == 0.0 or k == len(self.ends) - 1:
+            return np.asarray(self.values[k])
+        return _stepped(_maps(self.coefficients, self.ends[k : k + 1], np.array([length]))[0], self.values[k])
+
+
+def variation(
+    coefficients: Coefficients, ends: Array, start: Array, sizes: Array, least: Array, rtol: float
+) -> Variation:
+    """Solve Y' = A Y[:n] + B; steps are halved until the halves say the same.
+
+    Args:
+        coefficients: A and B, smooth between the first and the last of the ends; never asked for there.
+        ends: (s,) ends of the steps of the run, increasing, s.
+        start: (N, m) Y at the first of them.
+        sizes: (N,) sizes of what Y are the slopes of: those of one parameter are held against each other by them.
+        least: (m,) slopes, as parts of those sizes, below which all is rounding.
+        rtol: error of a step, as a part of the largest slope by the same parameter so far.
+
+    Raises:
+        SimulationError: it takes too many steps, or there is no value.
+    """
+    ends = np.append(ends[:-1:EVERY], ends[-1])
+    begins, lengths = ends[:-1], np.diff(ends)
+    steps = _Steps(begins, lengths, _maps(coefficients, begins, lengths), np.zeros(len(lengths), dtype=bool))
+    while True:
+        parts, whole = _parted(coefficients, steps)
+        values = _passed(parts.maps, start)
+        errors = np.abs(_stepped(steps.maps[~steps.right], values[whole]) - values[whole + 2])
+        largest = np.maximum.accumulate((np.abs(values) / sizes[:, None]).max(axis=1, initial=0.0), axis=0)
+        scale = sizes[:, None] * np.maximum(largest, least)[:, None]
+        accurate = (errors <= CLOSER * rtol * scale[whole + 2]).all(axis=(1, 2))
+        parts.right[whole] = parts.right[whole + 1] = accurate
+        if parts.right.all():
+            return Variation(coefficients, np.append(parts.begins, ends[-1]), values)
+        if len(parts.begins) > MOST_STEPS or not np.isfinite(values).all():
+            worst = int(np.argmin(parts.right))
+            raise SimulationError(f"The sensitivities could not be integrated beyond t = {parts.begins[worst]:.9g} s.")
+        steps = parts
+
+
+class _Steps(NamedTuple):
+    """Steps in a row.
+
+    Args:
+        begins: (s,) s.
+        lengths: (s,) s.
+        maps: (s, N, n + m) see `_maps`.
+        right: (s,) which of them need no smaller ones.
+    """
+
+    begins: Array
+    lengths: Array
+    maps: Array
+    right: NDArray[np.bool_]
+
+
+def _parted(coefficients: Coefficients, steps: _Steps) -> tuple[_Steps, NDArray[np.intp]]:
+    """Two halves for each step that is not right, and where the first ones are."""
+    order = np.repeat(np.arange(len(steps.begins)), np.where(steps.right, 1, 2))
+    first, halved = np.append(True, order[1:] != order[:-1]), ~steps.right[order]
+    lengths = np.where(halved, steps.lengths[order] / 2, steps.lengths[order])
+    begins = np.where(first, steps.begins[order], steps.begins[order] + lengths)
+    maps = steps.maps[order]
+    maps[halved] = _maps(coefficients, begins[halved], lengths[halved])
+    return _Steps(begins, lengths, maps, ~halved), np.flatnonzero(first & halved)
+
+
+def _passed(maps: Array, start: Array) -> Array:
+    """(s + 1, N, m) Y before the first step and after each."""
+    values = np.empty((len(maps) + 1, *start.shape))
+    values[0] = start
+    for k, one in enumerate(maps):
+        values[k + 1] = _stepped(one, values[k])
+    return values
+
+
+def _stepped(maps: Array, before: Array) -> Array:
+    """(..., N, m) Y after steps, from Y before them."""
+    size = maps.shape[-1] - before.shape[-1]
+    return np.asarray(before + maps[..., :size] @ before[..., :size, :] + maps[..., size:])
+
+
+def _maps(coefficients: Coefficients, begins: Array, lengths: Array) -> Array:
+    """(s, N, n + m) of each step P and, beside it, Q."""
+    A, B = coefficients((begins[:, None] + lengths[:, None] * NODES).ravel())
+    (_, every, size), columns = A.shape, A.shape[2] + B.shape[2]
+    both = np.concatenate([A, B], axis=2).reshape(len(begins), STAGES, every, columns)
+    maps = np.empty((len(begins), every, columns))
+    for steps in blocks(len(begins), (STAGES * size) ** 2):
+        maps[steps] = _solved(both[steps], size, lengths[steps])
+    return maps
+
+
+def _solved(both: Array, size: int, lengths: Array) -> Array:
+    """The same for as many steps as are solved at once, from A and B (s, stages, N, n + m)."""
+    count, columns = len(both), both.shape[-1]
+    h = lengths[:, None, None, None]
+    # K_i = A_i (Y + h sum_j a_ij K_j) + B_i for the slopes K at the stages
+    system = -np.einsum("s,ij,sipq->sipjq", lengths, _TO_NODES, both[:, :, :size, :size])
+    system = system.reshape(count, STAGES * size, STAGES * size) + np.eye(STAGES * size)
+    right = both[:, :, :size].reshape(count, STAGES * size, columns)
+    K = np.linalg.solve(system, right).reshape(count, STAGES, size, columns)
+    moved = h * np.einsum("ij,sjpc->sipc", _TO_NODES, K)
+    beside = both[:, :, size:] + both[:, :, size:, :size] @ moved
+    return np.asarray(lengths[:, None, None] * np.einsum("i,sipc->spc", _TO_END, np.concatenate([K, beside], axis=2)))
 
 
 class MotionSlopes:
@@ -117,7 +262,7 @@ class MotionSlopes:
         for k, leg in enumerate(self.legs):
             if k:
                 jump = jumps.over(self.legs[k - 1], leg, slopes, self._changes(leg))
-                if last is not None and self.legs[k - 1].end - self.legs[k - 1].start <= TOGETHER * length:
+                if last is not None and self.legs[k - 1].end - self.legs[k - 1].start <= SAME * length:
                     self._refuse_chance(leg, last, jump, length)
                 slopes, last = jump.slopes, jump
                 self._shifts.append(jump.shift)
@@ -183,7 +328,7 @@ class MotionSlopes:
             SimulationError: several changes come together there, and it is not known which one counts.
         """
         number = int(self._leg_at(np.array([t]))[0])
-        leg, near = self.legs[number], ON_IT * (self.legs[-1].end - self.legs[0].start)
+        leg, near = self.legs[number], EXACT * (self.legs[-1].end - self.legs[0].start)
         times, states = leg.read(np.array([t]))
         shown = self._shown(quantity, leg)
         by_states, by_parameters, _ = shown.slopes(float(times[0]), states[0], leg.p)
@@ -209,7 +354,7 @@ class MotionSlopes:
         aside = BESIDE * (leg.steps[k] - leg.steps[k - 1])
         low, high = max(t - aside, leg.low), min(t + aside, leg.high)
         if self._rate(quantity, leg, low) * self._rate(quantity, leg, high) < 0:
-            return zero(lambda time: np.array([self._rate(quantity, leg, time[0])]), low, high, xtol=aside * ON_IT)
+            return zero(lambda time: np.array([self._rate(quantity, leg, time[0])]), low, high, xtol=aside * EXACT)
         return t
 
     def _shown(self, quantity: str, leg: Leg) -> ValueWithSlopes:

@@ -24,21 +24,11 @@ from shaftwork.core.errors import SimulationError
 from shaftwork.pipeline.model import Model
 from shaftwork.sensitivities.carrying import End, SensitivityTransfer
 from shaftwork.sensitivities.differentiation import Differentiated
-from shaftwork.sensitivities.legs import Leg
+from shaftwork.sensitivities.legs import EXACT, LATE, SAME, Leg
 
 if TYPE_CHECKING:
     from shaftwork.hybrid.hybrid_state import Change
 
-TOGETHER = 1e-9
-"""Two causes act at once where the guard of the second is so near, as a part of the run."""
-CAUSED = 1e-5
-"""A guard has ended a mode where it is met within this part of the run, straight ahead."""
-GRAZING = 1e-9
-"""A guard is only touched where it changes more slowly than this part of what the largest rates would make of it."""
-EXACT = 1e-12
-"""Relative accuracy of the motion: what changes as slowly as a part of the largest rates is known so much worse."""
-EQUAL = 1e-9
-"""Rates, and derivatives of times, are equal where they differ by no more than this part of them."""
 ADVICE = "Take the difference of two variants, studies.sweep(...)."
 
 
@@ -228,7 +218,7 @@ class JumpConditions:
             yield _Cause(argument)
         instant = leg.model.switching.passed(leg.p, leg.high, new.leg.low, modes=True)
         met = sorted(self._met(old, changes), key=lambda pair: pair[0])
-        near = [TOGETHER if instant or k else CAUSED for k in range(len(met))]
+        near = [SAME if instant or k else LATE for k in range(len(met))]
         caused = [cause for (away, cause), most in zip(met, near, strict=True) if away <= most * self._span]
         if changes and not (caused or instant):
             raise SimulationError(
@@ -271,7 +261,7 @@ class JumpConditions:
             return np.zeros(len(moved)), 1.0
         rate = float(by_states @ old.rates[:size] + by_time)
         most = float(np.abs(by_states) @ self._swiftest(old.leg.model)[:size] + abs(by_time))
-        if not abs(rate) > GRAZING * most:
+        if not abs(rate) > SAME * most:
             raise _touched(old.leg, _worded(cause))
         return -moved / rate, abs(rate) / most
 
@@ -280,7 +270,7 @@ class JumpConditions:
         groups: list[_TiedTimes] = []
         for cause in causes:
             shift, pace = self._shift(old, slopes, cause)
-            alike = (k for k, one in enumerate(groups) if (np.abs(one.shift - shift) <= EQUAL * np.abs(shift)).all())
+            alike = (k for k, one in enumerate(groups) if (np.abs(one.shift - shift) <= SAME * np.abs(shift)).all())
             k = next(alike, None)
             if k is None:
                 groups.append(_TiedTimes(shift, pace, [cause]))
@@ -299,7 +289,7 @@ class JumpConditions:
             gained = self._after(old, new, group.causes) - old.rates
             total -= np.outer(gained, group.shift)
             rates += gained
-        if not adds or (np.abs(rates - new.rates) > EQUAL * self._swiftest(old.leg.model)).any():
+        if not adds or (np.abs(rates - new.rates) > SAME * self._swiftest(old.leg.model)).any():
             raise by_chance(new.leg, " and ".join(_worded(group.causes[0]) for group in groups))
         return total
 

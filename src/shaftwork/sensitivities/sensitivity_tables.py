@@ -9,12 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shaftwork.core.errors import imported
-from shaftwork.results.observer import Array
+from shaftwork.results.observer import Array, Complex
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from shaftwork.frequency.model_slopes import Complex
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,9 +12,8 @@ import numpy as np
 
 from shaftwork.core.errors import ParameterError, imported
 from shaftwork.core.parameters import in_si
-from shaftwork.results.course import turning_points
+from shaftwork.results.course import LobattoPanels, integrate, turning_points
 from shaftwork.results.observer import RPM, Array
-from shaftwork.results.quadrature import LobattoPanels, integrate
 from shaftwork.sizing.motor_shaft import REST, SMALLEST, MotorShaft, motor_shaft, run_up
 from shaftwork.sizing.reserve import Limit, Reserve, reserve_of, speed_torque_plane
 
@@ -335,7 +334,8 @@ def _measured(shaft: MotorShaft, motion: float, whole: float, cold: float, n_ful
 
     tau = turning_points(lambda t: shaft.read(t)[0], shaft.steps, smallest=SMALLEST).values
     power = turning_points(lambda t: np.multiply(*shaft.read(t)), shaft.steps, smallest=SMALLEST).values
-    total, panels = integrate(integrand, shaft.steps)
+    integrals = integrate(integrand, shaft.steps)
+    total, panels = integrals.totals, integrals.panels
     impulse, heat, power_square, turned, loaded, holding, cooled, *flows = total.tolist()
     return Duty(
         title=shaft.solution.name,

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from shaftwork.core.errors import ParameterError, imported
 from shaftwork.core.parameters import in_si
+from shaftwork.results.course import LobattoPanels
 from shaftwork.results.observer import RPM, Array
-from shaftwork.results.quadrature import LobattoPanels
 from shaftwork.sizing.catalogue import SHOWN, CatalogueMotor, catalogue
 from shaftwork.sizing.duty import Duty, cooling_at
 from shaftwork.sizing.motor_shaft import REST, SMALLEST, zeros

@@ -17,10 +17,8 @@ from shaftwork.components.sources import SpeedSource
 from shaftwork.core.errors import ParameterError, SignalError
 from shaftwork.core.parameters import in_si
 from shaftwork.network.wording import at_nodes, listed
-from shaftwork.results.course import turning_points
-from shaftwork.results.observer import Array, blocks
-from shaftwork.results.quadrature import LobattoPanels
-from shaftwork.results.reader import Read
+from shaftwork.results.course import LobattoPanels, turning_points
+from shaftwork.results.observer import Array, Read, blocks
 from shaftwork.results.solution import Solution
 
 SMALLEST = 1e-9

@@ -14,7 +14,7 @@ from shaftwork.studies.work_precision import work_precision
 from shaftwork.studies.work_precision_result import Trial, WorkPrecision
 
 if TYPE_CHECKING:
-    from shaftwork.sensitivities.study import frequency_sensitivities, motion_sensitivities
+    from shaftwork.sensitivities.sensitivities import frequency_sensitivities, motion_sensitivities
     from shaftwork.sweep.sweep import sweep
     from shaftwork.sweep.sweep_result import Sweep
 
@@ -34,8 +34,8 @@ __all__ = [
 
 _HOME = {
     "Sweep": "shaftwork.sweep.sweep_result",
-    "frequency_sensitivities": "shaftwork.sensitivities.study",
-    "motion_sensitivities": "shaftwork.sensitivities.study",
+    "frequency_sensitivities": "shaftwork.sensitivities.sensitivities",
+    "motion_sensitivities": "shaftwork.sensitivities.sensitivities",
     "sweep": "shaftwork.sweep.sweep",
 }
 

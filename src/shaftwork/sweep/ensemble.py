@@ -19,28 +19,22 @@ from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import CompileError, NetworkError
 from shaftwork.network.graph import GraphPart
 from shaftwork.pipeline.model import Model
-from shaftwork.results.measures import Measure
+from shaftwork.results.measures import EXTREMES, POWERS, Measure
 from shaftwork.sweep.ensemble_equations import (
-    EXTREMES,
-    POWERS,
     EnsembleCode,
     EnsembleEquations,
+    Met,
     ModeNames,
     PhaseEntry,
     VariantGroup,
     joined,
 )
-from shaftwork.sweep.lane_extremes import Index, Mask, first_rises, largest
-from shaftwork.sweep.lane_steps import LaneRun, Room, Steps
+from shaftwork.sweep.lane_steps import NEAR, Index, LaneRun, Mask, Room, Steps, first_rises, largest
 
 LONGEST = 1 / 50
 """Of the whole motion: a step."""
 MOST_ROUNDS = 200
 """Stretches of a motion, each up to a change of mode."""
-SAME = 1e-9
-"""What is stored has gone over unchanged where it differs by less than this, of the largest of its kind and of 1."""
-ON, OVER, LOST = -1, -2, -3
-"""What a lane has met where that is no guard: nothing, the end of the motion, and what it cannot pass."""
 FADING = "A law fades to a constant, as exp and tanh do, and a long step might pass over where it changes."
 
 
@@ -218,7 +212,7 @@ class _VariantCourse:
         if not group.lanes.size:
             return []
         ends = self._followed(equations, group, p, entry)
-        over = ends.met == OVER
+        over = ends.met == Met.THE_END
         self._end(equations, ends.group, p, over)
         following = []
         for guard in np.unique(ends.met[ends.met >= 0]).tolist():
@@ -233,16 +227,16 @@ class _VariantCourse:
         run = LaneRun(
             code.step, self.ensemble.room, group.x, rates, group.t, p, equations.sizes, limits, self.ensemble.rtol
         )
-        ends = _Ends(replace(group, t=group.t.copy(), x=group.x.copy()), np.full(group.lanes.size, LOST))
+        ends = _Ends(replace(group, t=group.t.copy(), x=group.x.copy()), np.full(group.lanes.size, Met.A_LIMIT))
         while run.lanes.size:
             lanes = run.lanes
             steps, good = run.go()
             met, rows = _met(equations, entry.offsets[:, lanes], steps)
             rows = np.where(met >= 0, rows, steps.last)
             good |= met >= 0
-            met[good & (met < 0) & (rows[-2] >= span[1])] = OVER
+            met[good & (met < 0) & (rows[-2] >= span[1])] = Met.THE_END
             self._measure(equations, steps, group.lanes[lanes], good, met >= 0)
-            done = good & (met != ON)
+            done = good & (met != Met.NOTHING)
             there = lanes[done]
             ends.met[there], ends.group.t[there], ends.group.x[:, there] = met[done], rows[-2, done], rows[:size, done]
             for row, place in code.integral_of.items():
@@ -263,7 +257,7 @@ class _VariantCourse:
             new, same = after.code.stored(t, x, parameters), np.ones(t.size, dtype=bool)
             for kind in after.code.kinds:
                 size = np.maximum(np.abs(old[kind]).max(axis=0, initial=0.0), 1.0)
-                same &= (np.abs(new[kind] - old[kind]) <= SAME * size).all(axis=0)
+                same &= (np.abs(new[kind] - old[kind]) <= NEAR * size).all(axis=0)
             groups.append(VariantGroup(modes, group.lanes[there], t, x).some(same))
         return groups
 
@@ -307,7 +301,7 @@ class _Ends:
 
     Args:
         group: the lanes with their times and states there.
-        met: (k,) the guard that each has met, OVER at the end of the motion, or LOST.
+        met: (k,) the guard that each has met, THE_END at the end of the motion, or A_LIMIT.
     """
 
     group: VariantGroup
@@ -315,8 +309,8 @@ class _Ends:
 
 
 def _met(equations: EnsembleEquations, offsets: Array, steps: Steps) -> tuple[Index, Array]:
-    """(k,) the guard that each lane meets first, or ON, and the rows (rows, k) there; from there on it stays there."""
-    met, first = np.full(steps.t.shape[1], ON), np.full(steps.t.shape[1], np.inf)
+    """(k,) the guard that each lane meets first, or NOTHING, and the rows (rows, k) there, where it then stays."""
+    met, first = np.full(steps.t.shape[1], Met.NOTHING), np.full(steps.t.shape[1], np.inf)
     at, rows = np.zeros(met.size, dtype=np.intp), np.zeros_like(steps.last)
     for guard in equations.watched.tolist():
         number, side = equations.code.guard(guard), float(equations.sides[guard])

@@ -4,25 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from sympy import Expr, Symbol
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.state_transfer import StateTransfer
+from shaftwork.codegen.taylor.heyoka_expressions import Translator
+from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError
+from shaftwork.formulation.explicit_rows import Rows
 from shaftwork.formulation.observables import Observables
 from shaftwork.pipeline.model import Model
-from shaftwork.results.measures import Measure
-from shaftwork.sweep.lane_extremes import Index, Mask
-from shaftwork.sweep.lane_program import LaneProgram, lane_expressions, lane_function, lane_program
-from shaftwork.sweep.lane_step import LaneStep, Use
+from shaftwork.results.measures import EXTREMES, POWERS, Measure
+from shaftwork.sweep.lane_step import LaneProgram, LaneStep, lane_function, lane_program
+from shaftwork.sweep.lane_steps import Index, Mask
 
-EXTREMES = {"max": (1.0,), "min": (-1.0,), "peak": (1.0, -1.0)}
-"""Measures that are the largest value of a quantity, times these signs."""
-POWERS = {"mean": 1, "rms": 2}
-"""Measures that are integrals of a quantity to some power."""
 ModeNames = tuple[str, ...]
 """The mode of every element; empty where no part changes its mode."""
 
@@ -54,11 +54,10 @@ class EnsembleCode:
         self.integral_of = {row: k for k, row in enumerate(integrated)}
         """By measure, which of the integrals behind the states is its."""
         self.program: LaneProgram = lane_program(program, model.rows, read)
-        uses = [Use(EXTREMES.get(measure.kind, ()), POWERS.get(measure.kind, 0)) for measure in measures]
-        self.step = LaneStep(self.program, tuple(uses))
+        self.step = LaneStep(self.program, tuple(measure.kind for measure in measures))
         self._parts = {"rates": self.program.rates, "guards": self.program.guards, "shown": self.program.quantities}
         stored = [self._expressed.store(name) for name in stores.names] if self.program.guards else []
-        self._parts["stored"] = lane_expressions(self._rows, stored)
+        self._parts["stored"] = _lane_expressions(self._rows, stored)
         expressions = tuple(one for part in self._parts.values() for one in part)
         self._points = lane_function(expressions, self.program.variables)
         """What is asked for at the ends of phases."""
@@ -98,6 +97,19 @@ class EnsembleCode:
         """Places of torques and currents among all that is stored, and of the rest."""
         through = [k for k, name in enumerate(self._stores.names) if name in self._stores.through]
         return through, [k for k in range(len(self._stores.names)) if k not in through]
+
+
+def _lane_expressions(rows: Rows, expressions: Sequence[Expr]) -> tuple[Any, ...]:
+    """Expressions of a network in heyoka's terms.
+
+    Raises:
+        CompileError: one has no counterpart in heyoka.
+    """
+    translator = Translator(rows.states, TIME, tuple(Symbol(p.name, real=True) for p in rows.parameters))
+    translated = tuple(translator.expression(expression) for expression in expressions)
+    if translator.switches or translator.held:
+        raise CompileError("A store switches by a condition, which variants side by side do not follow.")
+    return translated
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,6 +161,14 @@ class EnsembleEquations:
     def leaves_behind(self, before: EnsembleEquations, guard: int) -> bool:
         """Whether the guard by which these modes were entered is met no more; `entered` looks at all the others."""
         return before.code is not self.code or not self.sides[guard] == before.sides[guard] != 0.0
+
+
+class Met(IntEnum):
+    """What a lane has met where that is no guard: nothing, the end of the motion, or what it cannot pass."""
+
+    NOTHING = -1
+    THE_END = -2
+    A_LIMIT = -3
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ well: a stiff damper's torque may be wrong where the speeds are right, and what 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache, reduce
 from operator import mul
 from typing import Any
@@ -20,17 +20,25 @@ from typing import Any
 import heyoka
 import numpy as np
 from scipy.integrate import DOP853
+from sympy import Expr
 
 from shaftwork.codegen.array_form.elements import Array
+from shaftwork.codegen.taylor.heyoka import HeyokaProgram
+from shaftwork.codegen.taylor.heyoka_expressions import Translator
+from shaftwork.codegen.taylor.heyoka_parameters import Fixed
+from shaftwork.components.laws import t as TIME
+from shaftwork.core.errors import CompileError
+from shaftwork.formulation.explicit_rows import Rows
 from shaftwork.numerics.hermite import BEYOND, JET, apart, inner
-from shaftwork.sweep.lane_program import FREE_TIME, KEPT, LaneFunction, LaneProgram, at
+from shaftwork.results.measures import EXTREMES, POWERS
+from shaftwork.sweep.lane_steps import WITHOUT_LIMIT
+
+FREE_TIME = heyoka.expression("time")
+"""By its own time heyoka does not differentiate."""
+
 
 SAFETY, LEAST_FACTOR, MOST_FACTOR = 0.85, 0.2, 5.0
 """Of the next step by the error of this one."""
-NOWHERE = -1e300
-"""So far comes what has not been seen yet."""
-BOTH = (1.0, -1.0)
-"""The signs of what may matter on both sides."""
 OF_A_QUANTITY, CANCELLED = 10.0, 1e-4
 """What is measured may be wrong by so many times as much as a state, and by the error of so small a part of what it is
 the difference of: of a stiff damper's torque more would be lost in rounding."""
@@ -39,16 +47,118 @@ TINY = 1e-30
 
 
 @dataclass(frozen=True)
-class Use:
-    """What is wanted of a quantity.
+class LaneFunction:
+    """Expressions as a function of many states, parameters and times at once.
 
     Args:
-        signs: 1 for its maximum, -1 for its minimum.
-        power: of the quantity, of which the integral over the motion is wanted; 0 for none.
+        expressions: heyoka's, in its parameters.
+        variables: heyoka's variables.
     """
 
-    signs: tuple[float, ...] = ()
-    power: int = 0
+    expressions: tuple[Any, ...]
+    variables: tuple[Any, ...]
+
+    @cached_property
+    def _compiled(self) -> tuple[Any, list[int]]:
+        """The function and the parameters that it reads; it knows no others, so that only these are repeated."""
+        read = heyoka.get_params(list(self.expressions))
+        used = sorted(int(str(parameter)[1:]) for parameter in read)
+        renamed = {heyoka.par[number]: heyoka.par[k] for k, number in enumerate(used)}
+        expressions = heyoka.subs(list(self.expressions), renamed) if used else list(self.expressions)
+        # fast_math: a quarter faster; what is not finite is found by whoever asks
+        return heyoka.cfunc(expressions, vars=list(self.variables), opt_level=1, fast_math=True), used
+
+    def __call__(self, t: Array, x: Array, p: Array) -> Array:
+        """Values (expressions, k) at times (k,) in s, states (n, k), parameters (parameters, k)."""
+        values = np.empty((len(self.expressions), t.size))
+        if self.expressions and t.size:
+            function, _ = self._compiled
+            time: dict[str, Any] = {"time": np.ascontiguousarray(t)} if function.is_time_dependent else {}
+            self.into(values, np.ascontiguousarray(x), self.taken(p), **time)
+        return values
+
+    def taken(self, p: Array) -> Array:
+        """Of the parameters (parameters, k) those that are read."""
+        return np.ascontiguousarray(p[self._compiled[1]])
+
+    def into(self, values: Array, x: Array, taken: Array, **options: Any) -> None:
+        """Write values (expressions, k) for variables (n, k) and what is `taken` of the parameters, all contiguous."""
+        function, used = self._compiled
+        if used:
+            options["pars"] = taken
+        function(x, outputs=values, batch_parallel=False, **options)  # to hand out so few costs more than it brings
+
+
+@dataclass(frozen=True)
+class LaneProgram:
+    """A system whose variants run side by side.
+
+    Args:
+        variables: heyoka's state variables.
+        rates: heyoka expressions of the derivatives.
+        guards: heyoka expressions that end a lane where they rise through zero on their side.
+        quantities: heyoka expressions that are measured.
+        parameter_count: number of the model's parameters and of what is fixed by them, which follows.
+        fixed: what is made of the model's parameters alone; programs with the same expressions are the same.
+    """
+
+    variables: tuple[Any, ...]
+    rates: tuple[Any, ...]
+    guards: tuple[Any, ...]
+    quantities: tuple[Any, ...]
+    parameter_count: int
+    fixed: Fixed = field(compare=False)
+
+    def parameters(self, p: Array) -> Array:
+        """(parameters, k) those of the model and what is fixed by them, from those of the model alone."""
+        return np.concatenate([p, self.fixed.values(p)])
+
+    def jet(self, quantity: Any) -> tuple[Any, ...]:
+        """A heyoka expression and its first two derivatives by time along the motion."""
+        jet = [quantity]
+        for _ in range(JET - 1):
+            free = at(jet[-1], FREE_TIME)
+            moved = [slope * rate for slope, rate in zip(self.gradient(jet[-1]), self.rates, strict=True)]
+            jet += heyoka.subs([heyoka.sum([heyoka.diff(free, FREE_TIME), *moved])], {FREE_TIME: heyoka.time})
+        return tuple(jet)
+
+    def gradient(self, quantity: Any) -> list[Any]:
+        """The derivatives of a heyoka expression by the states."""
+        free = at(quantity, FREE_TIME)
+        return list(heyoka.subs([heyoka.diff(free, x) for x in self.variables], {FREE_TIME: heyoka.time}))
+
+
+@lru_cache  # what heyoka keeps has to be written out before it is found
+def lane_function(expressions: tuple[Any, ...], variables: tuple[Any, ...]) -> LaneFunction:
+    """The function of expressions that are small enough to be compared."""
+    return LaneFunction(expressions, variables)
+
+
+def at(expression: Any, time: Any) -> Any:
+    """A heyoka expression at a time."""
+    return heyoka.subs([expression], {heyoka.time: time})[0]
+
+
+def lane_program(program: HeyokaProgram, rows: Rows, quantities: Sequence[Expr]) -> LaneProgram:
+    """The program for many variants of what there is a program for one.
+
+    Args:
+        program: for one variant, with its guards.
+        rows: the same as expressions.
+        quantities: expressions of what is measured.
+
+    Raises:
+        CompileError: a law or a quantity switches by a condition, which ends a step in each lane at a time of its own.
+    """
+    expressions = (*rows.rates, *quantities)
+    fixed = Fixed(rows.parameters, (*rows.states, TIME), expressions, before=program.fixed.places)
+    translator = Translator(rows.states, TIME, rows.parameters, fixed=fixed)
+    translated = tuple(translator.expression(expression) for expression in expressions)
+    if program.switches or program.fading or program.held is not None or translator.switches or translator.fading:
+        raise CompileError("A law or a quantity switches by a condition, which variants side by side do not follow.")
+    rates, measured = translated[: len(rows.rates)], translated[len(rows.rates) :]
+    count = len(rows.parameters) + len(fixed.places)
+    return LaneProgram(program.variables, rates, program.guards, measured, count, fixed)
 
 
 @dataclass(frozen=True)
@@ -65,24 +175,24 @@ class LaneStep:
 
     Args:
         program: the system.
-        uses: what is wanted of each of its quantities. There are jets of those with signs, and of the guards.
+        kinds: of each of its quantities the measure that is wanted. There are jets of extremes, and of the guards.
     """
 
     program: LaneProgram
-    uses: tuple[Use, ...]
+    kinds: tuple[str, ...]
 
     @cached_property
     def _integrals(self) -> list[tuple[Any, int]]:
         """Quantities and the powers that are integrated."""
-        pairs = zip(self.program.quantities, self.uses, strict=True)
-        return [(quantity, use.power) for quantity, use in pairs if use.power]
+        pairs = zip(self.program.quantities, self.kinds, strict=True)
+        return [(quantity, POWERS[kind]) for quantity, kind in pairs if kind in POWERS]
 
     @cached_property
     def _seen(self) -> list[tuple[Any, tuple[float, ...]]]:
         """Quantities of which there are jets, and the signs that matter."""
-        pairs = zip(self.program.quantities, self.uses, strict=True)
-        extremes = [(quantity, use.signs) for quantity, use in pairs if use.signs]
-        return [*extremes, *((guard, BOTH) for guard in self.program.guards)]
+        pairs = zip(self.program.quantities, self.kinds, strict=True)
+        extremes = [(quantity, EXTREMES[kind]) for quantity, kind in pairs if kind in EXTREMES]
+        return [*extremes, *((guard, EXTREMES["peak"]) for guard in self.program.guards)]
 
     @property
     def states(self) -> int:
@@ -124,7 +234,7 @@ class LaneStep:
 
     def forget(self, columns: Array) -> None:
         """Let nothing be seen in columns (height, k) yet but the jets at the start."""
-        columns[self.rows], columns[self.jets.stop :] = columns[self.rows - 2], NOWHERE
+        columns[self.rows], columns[self.jets.stop :] = columns[self.rows - 2], -WITHOUT_LIMIT
 
     def taken(self, p: Array, sizes: Array) -> Array:
         """What is read of parameters (parameters, k) and limits, with nominal sizes (n,) and no limits yet."""
@@ -182,7 +292,7 @@ class LaneStep:
         return reaches
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache  # what heyoka keeps has to be written out before it is found
 def _function(step: LaneStep) -> LaneFunction:
     """The function of a step; those of sweeps that differ in their numbers alone share it."""
     return step.written()

@@ -19,7 +19,7 @@ from shaftwork.hybrid.starts import conditional
 from shaftwork.pipeline.arguments import NOMINAL
 from shaftwork.sweep.ensemble import Ensemble
 from shaftwork.sweep.ensemble_equations import EnsembleCode, EnsembleEquations, ModeNames, PhaseEntry, VariantGroup
-from shaftwork.sweep.lane_extremes import Mask
+from shaftwork.sweep.lane_steps import Mask
 
 CLOCKED = "A limit at which a mode ends changes with the time by itself, and a long step might pass over that."
 Course = tuple[Array, Array, Array, Array]

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shaftwork.core.errors import MissingExtraError, ParameterError
+from shaftwork.core.errors import ParameterError, imported
 from shaftwork.core.files import replaced
 from shaftwork.core.parameters import whole
 from shaftwork.core.screen import counted
 from shaftwork.results.observer import Array
+from shaftwork.results.plotting import new_figure
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 
 SHOWN = 12
 """Rows of a printed table."""
+MOST_LINES = 2000
+"""Lines of a picture; more would hide each other."""
 VERDICTS = ("passed", "reason")
 """Columns of the table behind those of parameters and measures."""
 
@@ -75,11 +78,8 @@ class Sweep:
 
     def table(self) -> pd.DataFrame:
         """The columns as a data frame (extra `data`)."""
-        try:
-            import pandas as pd
-        except ImportError:
-            raise MissingExtraError("pandas", "data", "Sweep.table()") from None
-        return pd.DataFrame(self.columns)
+        frame: pd.DataFrame = imported("pandas", "data", "Sweep.table()").DataFrame(self.columns)
+        return frame
 
     def best(self, measure: str, count: int | None = None, *, largest: bool = False) -> Sweep:
         """The variants that meet the requirements, ranked.
@@ -163,26 +163,18 @@ class Sweep:
         return "\n".join([counts, *lines, *more])
 
 
-MOST_LINES = 2000
-"""More lines would hide each other."""
-
-
 def _parallel_coordinates(sweep: Sweep, names: tuple[str, ...]) -> Figure:
     """Each axis from the smallest to the largest value; what does not meet the requirements is grey, limits are red."""
-    try:
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise MissingExtraError("matplotlib", "plot", "Sweep.plot()") from None
-    from matplotlib.collections import LineCollection
-
     columns = {**sweep.parameters, **sweep.measures}
     if unknown := [name for name in names if name not in columns]:
         raise ParameterError(f"There is no column '{unknown[0]}'. There are: {', '.join(columns)}.")
     shown = names or tuple(columns)
+    figure = new_figure("Sweep.plot()", 2.2 * max(len(shown), 2), 4.8)
+    from matplotlib.collections import LineCollection
+
     rows = np.flatnonzero(~sweep.failed)[:MOST_LINES]
     low = {name: float(columns[name][rows].min(initial=np.inf)) for name in shown} if rows.size else {}
     size = {name: (float(columns[name][rows].max()) - low[name]) or 1.0 for name in low}
-    figure = Figure(figsize=(2.2 * max(len(shown), 2), 4.8), layout="constrained")
     axes = figure.subplots()
     shares = [(columns[name][rows] - low[name]) / size[name] for name in low]
     lines = np.array([list(enumerate(heights)) for heights in zip(*shares, strict=True)])

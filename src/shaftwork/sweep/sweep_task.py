@@ -50,6 +50,11 @@ SIDE_BY_SIDE = 16
 CHUNK, LONE_CHUNK = 2048, 8
 """Variants that are computed and stored at once: side by side, and one by one."""
 
+WORTH = 8.0
+"""Processes are started where what is left would take so long in s: each needs seconds to import and to compile."""
+
+Index = NDArray[np.intp]
+
 Reader = Measure | Callable[[Solution], float]
 
 
@@ -247,12 +252,6 @@ def _checked(part: Component) -> set[str]:
     with muted(NetworkWarning, AccuracyWarning):  # what is odd about it was said when it was made
         told.__post_init__()
     return read - {"__post_init__"}
-
-
-WORTH = 8.0
-"""Processes are started where what is left would take so long in s: each needs seconds to import and to compile."""
-
-Index = NDArray[np.intp]
 
 
 def cores() -> int:

@@ -16,8 +16,8 @@ The states x of the network between the shafts, and V and W of each of them, swi
     s x = A x + Bh h(s) + (B + s B1) v        what arrives at the ends, h = tau - Z omega, drives the network
     omega(s) = C x + Dh h(s) + D v            the ends of the shafts turn as the nodes do
 
-with h(s) and omega(s) linear in V and W. One small matrix for each s (`exact_problem`): its solutions are the frequency
-response, its singular points the rates of the modes.
+with h(s) and omega(s) linear in V and W. One small matrix for each s (`exact_spectrum`): its solutions are the
+frequency response, its singular points the rates of the modes.
 
 Source: the telegraph equations; Popenda 2019, (8)-(12), with d/dt replaced by s.
 """
@@ -31,8 +31,8 @@ from typing import Any
 
 import numpy as np
 
-from shaftwork.frequency.model_slopes import Complex, Motions, OpenSlopes
-from shaftwork.results.observer import Array
+from shaftwork.frequency.linearization import Linearization
+from shaftwork.results.observer import Array, Complex
 
 SMALL = 0.1
 """Below this G^2 the slope of sinhc is taken from its series."""
@@ -138,9 +138,9 @@ class ExactSlopes:
         lengths: of the shafts, m.
     """
 
-    open: OpenSlopes
+    open: Linearization
     lines: ExactLines
-    meshed: Motions
+    meshed: Linearization
     profiles: Mapping[str, tuple[str, tuple[float, ...]]]
     lengths: tuple[float, ...]
 
@@ -222,3 +222,7 @@ class ExactSlopes:
             return np.asarray(inside[number][:, int(owner.rpartition(".")[2])])
 
         return amplitude
+
+
+Motions = Linearization | ExactSlopes
+"""Small motions about a point, and a way to read every quantity of them by its name."""

@@ -28,7 +28,7 @@ from shaftwork.frequency.analysis import (
     operating_point,
     titled,
 )
-from shaftwork.frequency.exact_shafts.exact_lines import ExactLines, ExactSlopes
+from shaftwork.frequency.exact_lines import ExactLines, ExactSlopes
 from shaftwork.frequency.linear_model import ExactModel
 from shaftwork.frequency.linearization import Linearization
 from shaftwork.frequency.natural_modes import Modes, find_modes

@@ -1,1 +1,0 @@
-"""Shafts without a mesh in the frequency domain."""
