@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -13,12 +13,37 @@ from shaftwork.codegen.array_form.elements import Array, blocks
 from shaftwork.codegen.array_form.recovery import BranchHistory, branches_with_power
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.codegen.times.timeline import NOTHING, Timeline
-from shaftwork.codegen.waves import DenseWaves, WaveReadings, along_lines
 from shaftwork.components.base import Component, Profile
 from shaftwork.core.errors import SignalError
 from shaftwork.formulation.form import Names, StateForm
 from shaftwork.network.graph import CircuitGraph, GraphPart
 from shaftwork.network.kinds import Kind
+
+
+class DenseWaves(Protocol):
+    """States, and histories behind them, at any time."""
+
+    @property
+    def steps(self) -> Array:
+        """Ends of the steps, the start first, s."""
+        ...
+
+    def __call__(self, times: Array) -> Array:
+        """(k, n) at times (k,)."""
+        ...
+
+
+@runtime_checkable
+class WaveReadings(Protocol):
+    """What a motion of a network with lines can tell besides."""
+
+    def held(self, times: Array) -> Array:
+        """(k, lines) energy in J that is on its way in each line at times (k,)."""
+        ...
+
+    def leaving(self, times: Array) -> Array:
+        """(k, ends) the waves 2 Z v + h in N m that leave the ends at times (k,), also before the start."""
+        ...
 
 
 class Impact(NamedTuple):
@@ -146,7 +171,7 @@ class ModelObserver:
         """(k, places) a quantity along a part by its name in `profiles`."""
         part, profile = self._profiles[name]
         if profile.lines:
-            return along_lines(self._bind(), part, profile, t, _carrying(dense))
+            return _along_lines(self._bind(), part, profile, t, _carrying(dense))
         return self._read(t, x, lambda history: history.profile(part, profile))
 
     def impacts(self, dense: DenseWaves) -> tuple[Impact, ...]:
@@ -237,3 +262,20 @@ def _carrying(dense: DenseWaves | None) -> WaveReadings:
     if not isinstance(dense, WaveReadings):
         raise SignalError("A wave is on its way, and one instant does not tell it. Read it of a motion.")
     return dense
+
+
+def _along_lines(bound: BoundArrays, part: GraphPart, profile: Profile, t: Array, dense: WaveReadings) -> Array:
+    """(k, places) torque or speed along a part that is made of lines.
+
+    Law: tau = (f - g) / 2, omega = (f + g) / (2 Z), with f and g the waves that have left the two ends and come by.
+    """
+    ends, (impedances, delays) = bound.program.form.waves, bound.lines
+    labels = {bound.program.form.graph.branches[k].template.label: k for k in part.branches}
+    values = np.empty((len(t), len(profile.lines)))
+    for place, (label, share) in enumerate(profile.lines):
+        first = ends.index(labels[f"{label}_a" if f"{label}_a" in labels else f"{label}_middle"])
+        impedance, delay = float(impedances[first // 2]), float(delays[first // 2])
+        f = dense.leaving(t - share * delay)[:, first]
+        g = dense.leaving(t - (1 - share) * delay)[:, first + 1]
+        values[:, place] = (f - g) / 2 if profile.kind == "through" else (f + g) / (2 * impedance)
+    return values

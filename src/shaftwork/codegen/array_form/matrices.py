@@ -22,22 +22,21 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from shaftwork.codegen.array_form.elements import (
+    FULL,
     Array,
     Coefficients,
+    Factor,
     GainMatrix,
     inverse_of_fractions,
     link_matrix,
     node_matrix,
 )
-from shaftwork.codegen.array_form.products import Factor
 from shaftwork.core.errors import CompileError
 from shaftwork.formulation.form import StateForm
 from shaftwork.network.kinds import Kind
 
 SINGULAR = 1e-13
 """Reciprocal condition below which a block of algebraic equations has no solution to speak of."""
-SMALL = 96
-"""Branches up to which the blocks are arrays: products of small sparse matrices cost a hundred times as much."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +222,7 @@ class _MatrixBlocks:
         }
         self._groups = {name: np.array(members, dtype=np.intp) for name, members in groups.items()}
         self.rational = isinstance(loops, np.ndarray)
-        self._small = self.rational or loops.shape[0] <= SMALL
+        self._small = self.rational or np.prod(loops.shape) <= FULL
         self._number: type = object if self.rational else float
         self._loops = self.own(loops)
         self._cutsets = self._loops if cutsets is loops else self.own(cutsets)

@@ -18,10 +18,9 @@ from typing import Any
 import numpy as np
 from sympy import Float
 
-from shaftwork.codegen.array_form.elements import Array
+from shaftwork.codegen.array_form.elements import Array, Factor
 from shaftwork.codegen.array_form.linear_readings import ReadingMatrices
 from shaftwork.codegen.array_form.matrices import LinearPart
-from shaftwork.codegen.array_form.products import Factor
 from shaftwork.codegen.compiled_model import ScalarProgram
 from shaftwork.components.discontinuities import parts
 from shaftwork.components.noise import HeldNoise, SmoothNoise
