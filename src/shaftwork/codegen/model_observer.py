@@ -12,7 +12,7 @@ from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array, blocks
 from shaftwork.codegen.array_form.recovery import BranchHistory, branches_with_power
 from shaftwork.codegen.state_transfer import StateTransfer
-from shaftwork.codegen.times.timeline import NOTHING, Timeline
+from shaftwork.codegen.timeline import NOTHING, Timeline
 from shaftwork.components.base import Component, Profile
 from shaftwork.core.errors import SignalError
 from shaftwork.formulation.form import Names, StateForm

@@ -14,12 +14,11 @@ from shaftwork.components.discontinuities import breakpoints
 from shaftwork.components.laws import t
 from shaftwork.components.tables import InterpolationSlope
 from shaftwork.core.errors import Diagnostic
-from shaftwork.formulation.controlled_sources import controlled_problems, reads_itself
 from shaftwork.formulation.form import StateForm, state_form
 from shaftwork.formulation.gains import value_of
 from shaftwork.formulation.tree import column_of
 from shaftwork.formulation.value_diagnosis import extreme_ratios, notes_of, numeric_problems
-from shaftwork.formulation.view import View, words_of
+from shaftwork.formulation.view import View, controlled_problems, reads_itself, words_of
 from shaftwork.network.checks import LEFT_OUT, connection_problems, examine
 from shaftwork.network.graph import CircuitGraph, GraphPart, build_graph
 from shaftwork.network.kinds import Kind

@@ -9,7 +9,7 @@ import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.compiled_model import CompiledModel
-from shaftwork.codegen.starts.start_values import Start, initial_state
+from shaftwork.codegen.start_values import Start, initial_state
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.notices import hint, once

@@ -14,7 +14,7 @@ from sympy import Expr
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.code import Moves
-from shaftwork.codegen.times.timeline import Timeline
+from shaftwork.codegen.timeline import Timeline
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Mode
 from shaftwork.hybrid.modes.mode_equations import Limits, ModeEquations, Motion, Near

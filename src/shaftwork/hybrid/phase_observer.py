@@ -12,7 +12,7 @@ from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array, Index
 from shaftwork.codegen.model_observer import DenseWaves, Impact, ModelObserver
 from shaftwork.codegen.state_transfer import StateTransfer
-from shaftwork.codegen.times.timeline import Timeline
+from shaftwork.codegen.timeline import Timeline
 from shaftwork.components.base import Component
 
 

@@ -10,7 +10,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array
-from shaftwork.codegen.starts.start_values import initial_state
+from shaftwork.codegen.start_values import initial_state
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.core.errors import AccuracyWarning, Diagnostic, NetworkWarning, ParameterError
 from shaftwork.core.notices import warn

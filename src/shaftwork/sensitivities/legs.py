@@ -10,7 +10,7 @@ import numpy as np
 from sympy import Expr
 
 from shaftwork.codegen.array_form.elements import Array
-from shaftwork.codegen.times.timeline import Timeline
+from shaftwork.codegen.timeline import Timeline
 from shaftwork.core.errors import SimulationError
 from shaftwork.frequency.analysis import Given
 from shaftwork.hybrid.hybrid_run import HybridRun, Span

@@ -11,7 +11,7 @@ import numpy as np
 from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.array_form.recovery import BranchHistory
-from shaftwork.codegen.starts.start_values import Start, at_rest
+from shaftwork.codegen.start_values import Start, at_rest
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.base import Component
 from shaftwork.components.shaft_models import Lumped, Wave

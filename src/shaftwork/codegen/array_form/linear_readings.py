@@ -13,7 +13,7 @@ from scipy import sparse
 from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import ROUNDING, Array, Factor, blocks
 from shaftwork.codegen.array_form.recovery import BranchHistory, GivenHistory
-from shaftwork.codegen.times.sampling import GOLDEN
+from shaftwork.codegen.timeline import GOLDEN
 
 Read = Callable[[BranchHistory], Array]
 

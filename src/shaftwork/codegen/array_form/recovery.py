@@ -11,7 +11,7 @@ from sympy import Expr
 
 from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
-from shaftwork.codegen.valueless import without_value
+from shaftwork.codegen.undefined_laws import without_value
 from shaftwork.components.base import Profile, Signal
 from shaftwork.components.branches import INTEGRAL, RATE, End
 from shaftwork.components.law_slopes import slope

@@ -20,7 +20,7 @@ from shaftwork.codegen.array_form.recovery import BranchHistory
 from shaftwork.codegen.code import Moves, around, bindable, is_rough, vectorised, vectorised_list
 from shaftwork.codegen.compiled_model import ScalarProgram
 from shaftwork.codegen.state_transfer import StateTransfer
-from shaftwork.codegen.valueless import first_missing, in_words, rough, without_value
+from shaftwork.codegen.undefined_laws import first_missing, in_words, rough, without_value
 from shaftwork.components.discontinuities import pieces_degree
 from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME

@@ -14,9 +14,8 @@ from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.array_form.linear_readings import GivenSpeeds, LinearQuantity, LinearRow
 from shaftwork.codegen.array_form.recovery import BranchHistory
-from shaftwork.codegen.starts.operating import energy_weights
-from shaftwork.codegen.starts.start_names import StartNames
-from shaftwork.codegen.starts.wound_shafts import speeds_inside
+from shaftwork.codegen.operating import energy_weights
+from shaftwork.codegen.start_names import StartNames, speeds_inside
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.times import just_after
 

@@ -13,8 +13,18 @@ from sympy import Expr, Min, Symbol, pi, sin
 
 from shaftwork.codegen.array_form.elements import Array, Index
 from shaftwork.codegen.code import scalar, vectorised
-from shaftwork.codegen.times.sampling import MOST_SAMPLES, RESOLVED, Sides, bumps, changes_of, nearest, sampled
-from shaftwork.codegen.times.timeline import NOTHING, Timeline, timeline
+from shaftwork.codegen.timeline import (
+    MOST_SAMPLES,
+    NOTHING,
+    RESOLVED,
+    Sides,
+    Timeline,
+    bumps,
+    changes_of,
+    nearest,
+    sampled,
+    timeline,
+)
 from shaftwork.components.discontinuities import line, narrow_places, switches, unsolved_places
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ParameterError

@@ -10,7 +10,7 @@ from scipy.sparse.linalg import MatrixRankWarning, lsqr, splu
 
 from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
-from shaftwork.codegen.starts.wound_shafts import inner_nodes, node_of, speed_at
+from shaftwork.codegen.start_names import inner_nodes, node_of, speed_at
 from shaftwork.core.errors import SimulationError
 from shaftwork.core.notices import hint
 from shaftwork.formulation.form import StateForm
