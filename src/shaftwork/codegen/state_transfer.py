@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.codegen.array_form.arrays import BoundArrays
-from shaftwork.codegen.array_form.elements import ROUNDING, Array
+from shaftwork.codegen.array_form.elements import ROUNDING, SAME, Array
 from shaftwork.codegen.array_form.matrices import LinearPart
 from shaftwork.codegen.array_form.recovery import BranchHistory
 from shaftwork.core.errors import CompileError
@@ -254,8 +254,6 @@ class _Maps:
         return by_stores, by_inputs
 
 
-ROUNDED = 1e-9
-"""A part of the largest speed by which contacts may close after an impact: impulses that share it are rounded."""
 LEAST = 1e-10
 """What is added to the diagonal of a matrix of ones, so that of many solutions the least one is found."""
 WITHOUT_INERTIA = (Kind.CONDUCTANCE, Kind.LAW, Kind.THROUGH_STORE)
@@ -327,7 +325,7 @@ def complementary(W: Array, q: Array) -> Array | None:
         return None
     shares = np.zeros(len(q))
     shares[pressed] = np.linalg.lstsq(V[np.ix_(pressed, pressed)], -b[pressed], rcond=ROUNDING)[0]
-    keeps = V @ shares + b > -ROUNDED * np.abs(b).max(initial=0.0)
+    keeps = V @ shares + b > -SAME * np.abs(b).max(initial=0.0)
     return np.maximum(shares, 0.0) * scale if keeps.all() else None
 
 

@@ -9,6 +9,7 @@ from bisect import bisect_left
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -108,20 +109,33 @@ NOTHING = Timeline()
 """Of a run in which no input jumps or bends."""
 
 
-# A law of time is looked at so many times, and again at four times as many, until it changes sides no more often.
-FEWEST_SAMPLES, MOST_SAMPLES = 2**12, 2**22
-RESOLVED = 8
-"""Samples that there must be for each change of side."""
-# An argument rounds badly where its terms cancel: it is looked at farther and farther from a change of side, up to this
-# part of the run and of the way to the next change, until it keeps its sides.
-FARTHEST, CLEAR = 1e-6, 1 / 8
+class Search(NamedTuple):
+    """How closely functions of time are looked at in a run.
+
+    Args:
+        samples: of a run: what is narrower than a few of its parts of that number may be missed. The sides of a switch
+            are looked at a fourth as often at first, and again four times as often until it changes them no more often.
+        most: samples, at which a switch is given up.
+        resolved: samples that there must be for each change of side.
+        farthest: an argument rounds badly where its terms cancel: it is looked at farther and farther from a change of
+            side, up to this part of the run, until it keeps its sides.
+        plain: a function goes straight on, to this part of its range, where no bump is: waves of up to 50 periods do
+            everywhere.
+        apart: a bump has so many times its width of plain course on one side: no step passes what lasts longer
+            unawares.
+    """
+
+    samples: int = 2**14
+    most: int = 2**22
+    resolved: int = 8
+    farthest: float = 1e-6
+    plain: float = 1e-4
+    apart: float = 2.0
+
+
+SEARCH = Search()
 PROBES = np.array([1.0, 1.5, 2.0, 3.0, 4.0])
-SAMPLES = 2**14
-"""Of a run: what is narrower than a few of its parts of that number may be missed."""
-PLAIN = 1e-4
-"""A function goes straight on, to this part of its range, where no bump is: waves of up to 50 periods do everywhere."""
-APART = 2.0
-"""A bump has so many times its width of plain course on one side: no step passes what lasts longer unawares."""
+"""Where the sides beside a change are looked at, in parts of its reach."""
 STOPS = np.linspace(-0.5, 1.5, 13)
 """Where steps end at a bump, in its widths: where it shows it is 1e-4 high, and began before."""
 GOLDEN = (math.sqrt(5) - 1) / 2
@@ -137,11 +151,11 @@ def irregular(t0: float, t_end: float, size: int) -> Array:
 
 def sampled(sides: Sides, t0: float, t_end: float) -> Array | None:
     """Times (k,) from t0 to t_end between which a switch changes sides at most once, or None."""
-    size, before = FEWEST_SAMPLES, -1
-    while size <= MOST_SAMPLES:
+    size, before = SEARCH.samples // 4, -1
+    while size <= SEARCH.most:
         t = irregular(t0, t_end, size)
         changes = int(np.count_nonzero(np.diff(sides(t))))
-        if changes == before and changes * RESOLVED <= size:
+        if changes == before and changes * SEARCH.resolved <= size:
             return np.unique(t)
         size, before = 4 * size, changes
     return None
@@ -197,7 +211,7 @@ def _bisected(sides: Sides, t: Array, grain: float) -> tuple[Array, Array, Index
 def _reach(sides: Sides, t: Array, times: Array, old: Index, new: Index, grain: float) -> Array:
     """How far from the times (k,) of changes the sides are the old and the new ones, whatever the rounding, in s."""
     gaps = np.diff(times, prepend=-np.inf, append=np.inf)
-    farthest = np.minimum(FARTHEST * (t[-1] - t[0]), CLEAR * np.minimum(gaps[:-1], gaps[1:]))
+    farthest = np.minimum(SEARCH.farthest * (t[-1] - t[0]), np.minimum(gaps[:-1], gaps[1:]) / SEARCH.resolved)
     reach = np.full(times.shape, CLEARANCE * grain)
     while True:
         offsets = reach[:, None] * PROBES
@@ -218,19 +232,19 @@ def bumps(function: Callable[[Array], Array], t0: float, t_end: float) -> Array:
         t0: start of the run, s.
         t_end: its end, s.
     """
-    t = irregular(t0, t_end, SAMPLES)
+    t = irregular(t0, t_end, SEARCH.samples)
     x = function(t)
     if not np.isfinite(x).all() or not np.ptp(x) > 0:
         return np.empty(0)
     straight = x[:-2] + (x[2:] - x[:-2]) * ((t[1:-1] - t[:-2]) / (t[2:] - t[:-2]))
-    bent = np.concatenate([[False], np.abs(x[1:-1] - straight) > PLAIN * np.ptp(x), [False]])
+    bent = np.concatenate([[False], np.abs(x[1:-1] - straight) > SEARCH.plain * np.ptp(x), [False]])
     edges = np.flatnonzero(np.diff(bent))
     stretches: list[tuple[float, float]] = []
     for begin, end in zip(t[edges[::2]].tolist(), t[edges[1::2] + 1].tolist(), strict=True):
         # where a flank turns, a bump is straight too
-        joined = stretches and begin - stretches[-1][1] < APART * max(end - begin, np.ptp(stretches[-1]))
+        joined = stretches and begin - stretches[-1][1] < SEARCH.apart * max(end - begin, np.ptp(stretches[-1]))
         stretches.append((stretches.pop()[0] if joined else begin, end))
     begins, ends = np.array(stretches).reshape(-1, 2).T
     plain = np.maximum(begins - np.append(t0, ends[:-1]), np.append(begins[1:], t_end) - ends)
     width = ends - begins
-    return np.unique((begins + STOPS[:, None] * width)[:, APART * width < plain])
+    return np.unique((begins + STOPS[:, None] * width)[:, SEARCH.apart * width < plain])

@@ -31,6 +31,8 @@ FARTHEST = 1e100
 numbers, as that of a shaft of 1e60 m, whose diameter counts to the fourth power."""
 ROUNDING = 1e-12
 """Part of the largest value up to which others are rounding, such as what an elimination leaves."""
+SAME = 1e-9
+"""Part of the largest by which values that are typed, or end an iteration, may differ and be the same."""
 AT_ONCE = 2_000_000
 """Numbers of many instants or columns that are made at once, 16 MB."""
 FULL = 16_000

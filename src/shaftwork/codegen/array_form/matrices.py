@@ -33,10 +33,8 @@ from shaftwork.codegen.array_form.elements import (
 )
 from shaftwork.core.errors import CompileError
 from shaftwork.formulation.form import StateForm
+from shaftwork.formulation.value_diagnosis import is_singular
 from shaftwork.network.kinds import Kind
-
-SINGULAR = 1e-13
-"""Reciprocal condition below which a block of algebraic equations has no solution to speak of."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +186,7 @@ class MatrixAssembly:
             block = matrix[members][:, members].toarray()
             scale = 1 / np.sqrt(np.abs(np.diag(block)) + np.finfo(float).tiny)
             scaled = block * scale[:, None] * scale[None, :]
-            if not 1 / np.linalg.cond(scaled) > SINGULAR:
+            if is_singular(block):
                 raise self._singular(branches[members], what)
             inverse = np.linalg.inv(scaled) * scale[:, None] * scale[None, :]
             rows.append(np.repeat(members, len(members)))
