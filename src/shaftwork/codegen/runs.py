@@ -13,7 +13,7 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from sympy import Add, Basic, Expr, Function, Integer, Mul, Rational, Symbol
+from sympy import Basic, Expr, Function, Integer, Rational, Symbol
 from sympy.printing.c import C99CodePrinter
 from sympy.printing.str import StrPrinter
 
@@ -255,7 +255,7 @@ class RunProgram:
     @cached_property
     def _runs(self) -> tuple[tuple[Stencil, ...], dict[Symbol, Basic]]:
         """The runs in terms of what parameters alone tell, and that by symbols."""
-        runs = [replace(run, rate=_by_coefficient(run)) for run in runs_of(self._rows)]
+        runs = runs_of(self._rows)
         constants = _Constants(self._rows.parameters, [run.rate for run in runs])
         return tuple(replace(run, rate=constants.taken_out(run.rate)) for run in runs), constants.values
 
@@ -330,24 +330,3 @@ def _read(rate: Expr) -> list[tuple[Symbol, int]]:
     """The states that a rate reads, and their distances."""
     states = (symbol for symbol in rate.free_symbols if symbol.name.startswith("x[i"))
     return sorted(((symbol, int(symbol.name[3:-1])) for symbol in states), key=lambda pair: pair[1])
-
-
-def _by_coefficient(run: Stencil) -> Expr:
-    """A rate that is linear in the states with what has the same coefficient together; others as they are."""
-    states = [symbol for symbol, _ in _read(run.rate)]
-    slopes = {symbol: run.rate.diff(symbol) for symbol in states}
-    if any(slope.has(*states) for slope in slopes.values()):
-        return run.rate
-    sums: dict[Expr, list[Expr]] = {}
-    for symbol, slope in slopes.items():
-        number, factor = slope.as_coeff_Mul()
-        sums.setdefault(factor, []).append(number * symbol)
-    rest = run.rate.xreplace(dict.fromkeys(states, Integer(0)))
-    total = Add(rest, *(symbol * slope for symbol, slope in slopes.items()))
-    if (run.rate - total).expand() != 0:  # of other pieces of a law, which may have the same slopes
-        return run.rate
-    terms = []
-    for factor, parts in sums.items():
-        least = min(abs(part.as_coeff_Mul()[0]) for part in parts)
-        terms.append(Mul(least * factor, Add(*(part / least for part in parts)), evaluate=False))
-    return Add(rest, *terms)
