@@ -219,9 +219,6 @@ class ModelObserver:
         templates = (self._graph.branches[k].template for k in branches_with_power(self._graph, part))
         return any(one.kind in (Kind.ACROSS_STORE, Kind.THROUGH_STORE) or one.stored != 0 for one in templates)
 
-    def _gives_back(self, part: GraphPart) -> bool:
-        return any(self._graph.branches[k].template.conservative for k in part.branches)
-
     def powers(self, t: Array, x: Array) -> tuple[dict[str, Array], dict[str, Array]]:
         """Lost and supplied power by part; of weights, and of sources with resistors or dampers of their own, both."""
         history = BranchHistory(self._bind(), self._instants.one_sided(t), x)
@@ -234,7 +231,8 @@ class ModelObserver:
             if Kind.CONDUCTANCE in kinds and len(kinds) > 1:  # a law that is linear in the speed is still a source
                 lost[part.name] = history.heat(part)
                 supplied[part.name] = supplied[part.name] + lost[part.name]
-        for part in (part for part in parts if part not in sources and self._gives_back(part)):
+        weights = (p for p in parts if any(self._graph.branches[k].template.conservative for k in p.branches))
+        for part in (part for part in weights if part not in sources):
             supplied[part.name] = -history.lifted(part)
             lost[part.name] = lost[part.name] + supplied[part.name]
         return lost, supplied

@@ -6,7 +6,7 @@ What parameters alone tell is computed before the loops. The same loops are writ
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -59,11 +59,11 @@ def runs_of(rows: Rows) -> tuple[Stencil, ...]:
             runs[-1] = replace(runs[-1], count=runs[-1].count + 1)
         else:
             runs.append(Stencil(i, 1, relative))
-    return tuple(one for run in runs for one in ([run] if run.count >= SHORTEST else _apart(run)))
-
-
-def _apart(run: Stencil) -> Iterator[Stencil]:
-    yield from (Stencil(run.first + k, 1, run.rate) for k in range(run.count))
+    apart = (
+        [run] if run.count >= SHORTEST else [Stencil(run.first + k, 1, run.rate) for k in range(run.count)]
+        for run in runs
+    )
+    return tuple(chain.from_iterable(apart))
 
 
 class _C(RealNumbers, C99CodePrinter):  # type: ignore[misc]
@@ -255,9 +255,21 @@ class RunProgram:
     @cached_property
     def _runs(self) -> tuple[tuple[Stencil, ...], dict[Symbol, Basic]]:
         """The runs in terms of what parameters alone tell, and that by symbols."""
-        runs = runs_of(self._rows)
-        constants = _Constants(self._rows.parameters, [run.rate for run in runs])
-        return tuple(replace(run, rate=constants.taken_out(run.rate)) for run in runs), constants.values
+        runs, symbols = runs_of(self._rows), dict[Basic, Symbol]()
+        free = dict.fromkeys(symbol for run in runs for symbol in run.rate.free_symbols)
+        moving = [symbol for symbol in free if symbol not in self._rows.parameters]
+        fixed = Fixed(self._rows.parameters, moving, [run.rate for run in runs])
+
+        def taken_out(node: Any) -> Any:
+            """With symbols in place of its largest parts of parameters alone."""
+            if node in fixed.places:
+                return symbols.setdefault(node, Symbol(f"c{len(symbols)}", real=True))
+            if not node.args or not node.free_symbols:
+                return node
+            return node.func(*map(taken_out, fixed.arguments(node)))
+
+        rates = tuple(replace(run, rate=taken_out(run.rate)) for run in runs)
+        return rates, {symbol: part for part, symbol in symbols.items()}
 
     def source(self, language: str) -> str:
         """The code in a language.
@@ -297,33 +309,6 @@ class RunProgram:
                 "Take model.rhs, or a formula in place of it."
             )
         return str(printer.doprint(expression))
-
-
-class _Constants:
-    """Symbols for what parameters alone tell in rates.
-
-    Args:
-        parameters: symbols.
-        rates: of all runs.
-    """
-
-    def __init__(self, parameters: Sequence[Symbol], rates: Sequence[Expr]) -> None:
-        free = dict.fromkeys(symbol for rate in rates for symbol in rate.free_symbols)
-        self._fixed = Fixed(parameters, [symbol for symbol in free if symbol not in parameters], rates)
-        self._symbols: dict[Basic, Symbol] = {}
-
-    @property
-    def values(self) -> dict[Symbol, Basic]:
-        """What each symbol stands for, in the order in which they were taken out."""
-        return {symbol: part for part, symbol in self._symbols.items()}
-
-    def taken_out(self, node: Any) -> Any:
-        """An expression with symbols in place of its largest parts of parameters alone."""
-        if node in self._fixed.places:
-            return self._symbols.setdefault(node, Symbol(f"c{len(self._symbols)}", real=True))
-        if not node.args or not node.free_symbols:
-            return node
-        return node.func(*map(self.taken_out, self._fixed.arguments(node)))
 
 
 def _read(rate: Expr) -> list[tuple[Symbol, int]]:

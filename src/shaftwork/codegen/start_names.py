@@ -56,18 +56,16 @@ class WoundShaft:
         return np.asarray(x[states] + np.pad(inside - x[states][1:-1], 1, mode="edge"))
 
 
-def wound_shafts(form: StateForm) -> Mapping[str, WoundShaft]:
+def wound_shafts(form: StateForm) -> dict[str, WoundShaft]:
     """By the name of the torque along it, "line.tau", each shaft of several elements whose torques all are states."""
-    return dict(_wound_shafts(form))
-
-
-def _wound_shafts(form: StateForm) -> Iterator[tuple[str, WoundShaft]]:
+    shafts: dict[str, WoundShaft] = {}
     state = {branch: k for k, branch in enumerate(form.through_states, form.torques.start)}
     for part in form.graph.parts:
         stores = [k for k in part.branches if form.graph.branches[k].template.kind is Kind.THROUGH_STORE]
         for name, profile in part.component.profiles().items():
             if profile.kind == "through" and len(profile.of) > 2 and stores and all(k in state for k in stores):
-                yield f"{part.name}.{name}", WoundShaft(part, profile, tuple(state[k] for k in stores))
+                shafts[f"{part.name}.{name}"] = WoundShaft(part, profile, tuple(state[k] for k in stores))
+    return shafts
 
 
 def speeds_inside(form: StateForm, given: GivenSpeeds) -> dict[int, float]:

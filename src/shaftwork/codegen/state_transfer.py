@@ -32,6 +32,7 @@ from shaftwork.codegen.array_form.elements import ROUNDING, SAME, Array
 from shaftwork.codegen.array_form.matrices import LinearPart
 from shaftwork.codegen.array_form.recovery import BranchHistory
 from shaftwork.core.errors import CompileError
+from shaftwork.core.kept import Kept
 from shaftwork.formulation.form import StateForm, store_name
 from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind
@@ -57,7 +58,7 @@ class StateTransfer:
         self.through = tuple(name for name, template in templates if template.kind is Kind.THROUGH_STORE)
         """Those of the names that are torques of springs or currents of inductors."""
         self._states = [state.name for state in form.states]
-        self._maps: _Maps | None = None
+        self._to_stores, self._to_states = Kept[LinearPart, Array](1), Kept[LinearPart, tuple[Array, Array]](1)
 
     @cached_property
     def _columns(self) -> list[int]:
@@ -79,19 +80,27 @@ class StateTransfer:
         """
         if -1 not in self._columns:
             return x[:, self._columns]
-        states = x[:, : len(self._states)]  # waves may follow them
-        return states @ self._maps_of(bind().part).to_stores if self.by_loops else self._recovered(bind(), t, x)
+        if not self.by_loops:
+            return self._recovered(bind(), t, x)
+        part = bind().part
+        return x[:, : len(self._states)] @ self._to_stores(part, lambda: self._store_map(part))  # waves may follow
 
     def at_once(self, bind: Callable[[], BoundArrays], t: float, x: Array) -> dict[str, float]:
         """All that is stored at one time in s with the states (n,), by name; without full matrices."""
         values = x[self._columns] if -1 not in self._columns else self._recovered(bind(), np.array([t]), x[None, :])[0]
         return dict(zip(self.names, values.tolist(), strict=True))
 
-    def _maps_of(self, part: LinearPart) -> _Maps:
-        """The maps between states and stores; the last ones are kept."""
-        if self._maps is None or self._maps.part is not part:
-            self._maps = _Maps(self._form, part, tuple(self.branches.values()), self._columns)
-        return self._maps
+    def _store_map(self, part: LinearPart) -> Array:
+        """(n, stores) what states are multiplied by, where stores follow from loops and cutsets alone."""
+        form, matrix, (loops, cutsets) = self._form, np.zeros((len(self._states), len(self.names))), _full(part)
+        for column, (name, state) in enumerate(zip(self.names, self._columns, strict=True)):
+            if state >= 0:
+                matrix[state, column] = 1.0
+            elif (branch := self.branches[name]) in form.tree.loops:
+                matrix[form.speeds, column] = loops[list(form.across_states), branch]
+            else:
+                matrix[form.torques, column] = -cutsets[branch, list(form.through_states)]
+        return matrix
 
     def _recovered(self, bound: BoundArrays, t: Array, x: Array) -> Array:
         history, columns = BranchHistory(bound, t, x), []
@@ -114,11 +123,35 @@ class StateTransfer:
         """
         if not (self._form.dependent_across or self._form.dependent_through):
             return np.array([stored[name] for name in self._states])
-        by_stores, by_inputs = self._maps_of(bound.part).to_states
+        by_stores, by_inputs = self._to_states(bound.part, lambda: self._state_maps(bound.part))
         x = by_stores @ np.array([stored[name] for name in self.names])
         if by_inputs.any():
             x += by_inputs @ bound.program.inputs.sources(t, x, bound.p)
         return np.asarray(x)
+
+    def _state_maps(self, part: LinearPart) -> tuple[Array, Array]:
+        """(n, stores) and (n, m) what stores and inputs are multiplied by in the states that equations start with."""
+        form, k, laws, (loops, cutsets) = self._form, part.coefficients, len(self._form.laws), _full(part)
+        size, angles, stores = len(form.states), len(form.integrals), len(self.branches)
+        by_branches, by_inputs = np.zeros((size, len(k))), np.zeros((size, laws + len(form.across_inputs)))
+        across, through = list(form.across_states), list(form.through_states)
+        speeds, torques = form.speeds, form.torques
+        by_branches[speeds, across], by_branches[torques, through] = np.eye(len(across)), np.eye(len(through))
+        if other := list(form.dependent_across):
+            F, Q = (matrix[np.ix_(across, other)] for matrix in (loops, cutsets))
+            taken_up = np.linalg.inv(np.diag(k[across]) + Q * k[other] @ F.T)
+            by_branches[speeds, across], by_branches[speeds, other] = taken_up * k[across], taken_up @ Q * k[other]
+            by_inputs[speeds, laws:] = -by_branches[speeds, other] @ loops[np.ix_(list(form.across_inputs), other)].T
+        if other := list(form.dependent_through):
+            F, Q = (matrix[np.ix_(other, through)] for matrix in (loops, cutsets))
+            taken_up = np.linalg.inv(np.diag(1 / k[through]) + F.T / k[other] @ Q)
+            by_branches[torques, through] = taken_up / k[through]
+            by_branches[torques, other] = -taken_up @ F.T / k[other]
+            by_inputs[torques, :laws] = by_branches[torques, other] @ cutsets[np.ix_(other, list(form.laws))]
+        by_stores = np.zeros((size, len(self.names)))
+        by_stores[:, :stores] = by_branches[:, list(self.branches.values())]
+        by_stores[size - angles :, stores:] = np.eye(angles)
+        return by_stores, by_inputs
 
     def energy(self, bound: BoundArrays, stored: Mapping[str, float]) -> float:
         """What is stored, in J: k v^2 / 2 in inertias and masses, tau^2 / 2 c in springs."""
@@ -143,7 +176,7 @@ class StateTransfer:
             part = self._form.graph.part_of(self._form.inertial[0]).name
             raise CompileError(f"An impulse meets '{part}', whose inertia changes: no impact can be told there.")
         program = bound.program
-        nodes, shares = (matrix(bound.p).toarray() for matrix in (program.potentials, program.shares))
+        nodes, shares = (matrix(bound.p).toarray() for matrix in (program.assembly.potentials, program.shares))
         return Mobility(self._form, bound, nodes, shares, pairs)
 
     def impulses(self, bound: BoundArrays, gained: Mapping[str, float]) -> Array:
@@ -194,64 +227,6 @@ class StateTransfer:
             part = form.graph.part_of(branch).name
             energies[part] = energies.get(part, 0.0) - float(taken)
         return {part: energy for part, energy in energies.items() if energy}
-
-
-class _Maps:
-    """The maps between states and stores with the matrices of one parameter vector.
-
-    Args:
-        form: the state form.
-        part: the matrices.
-        branches: of the stores.
-        columns: of every store and angle its place among the states, or -1.
-    """
-
-    def __init__(self, form: StateForm, part: LinearPart, branches: Sequence[int], columns: Sequence[int]) -> None:
-        self.part, self._form, self._branches, self._columns = part, form, branches, columns
-        self._loops: Array = part.loops.toarray()
-        self._cutsets: Array = self._loops if part.cutsets is part.loops else part.cutsets.toarray()
-
-    @cached_property
-    def to_stores(self) -> Array:
-        """(n, stores) what states are multiplied by, where stores follow from loops and cutsets alone."""
-        form, matrix = self._form, np.zeros((len(self._form.states), len(self._columns)))
-        for column, state in enumerate(self._columns):
-            if state >= 0:
-                matrix[state, column] = 1.0
-                continue
-            branch = self._branches[column]
-            if branch in form.tree.loops:
-                matrix[form.speeds, column] = self._loops[list(form.across_states), branch]
-            else:
-                matrix[form.torques, column] = -self._cutsets[branch, list(form.through_states)]
-        return matrix
-
-    @cached_property
-    def to_states(self) -> tuple[Array, Array]:
-        """(n, stores) and (n, m) what stores and inputs are multiplied by in the states that equations start with."""
-        form, k, laws = self._form, self.part.coefficients, len(self._form.laws)
-        size, angles, stores = len(form.states), len(form.integrals), len(self._branches)
-        by_branches, by_inputs = np.zeros((size, len(k))), np.zeros((size, laws + len(form.across_inputs)))
-        across, through = list(form.across_states), list(form.through_states)
-        speeds, torques = form.speeds, form.torques
-        by_branches[speeds, across], by_branches[torques, through] = np.eye(len(across)), np.eye(len(through))
-        if other := list(form.dependent_across):
-            F, Q = (matrix[np.ix_(across, other)] for matrix in (self._loops, self._cutsets))
-            taken_up = np.linalg.inv(np.diag(k[across]) + Q * k[other] @ F.T)
-            by_branches[speeds, across], by_branches[speeds, other] = taken_up * k[across], taken_up @ Q * k[other]
-            by_inputs[speeds, laws:] = (
-                -by_branches[speeds, other] @ self._loops[np.ix_(list(form.across_inputs), other)].T
-            )
-        if other := list(form.dependent_through):
-            F, Q = (matrix[np.ix_(other, through)] for matrix in (self._loops, self._cutsets))
-            taken_up = np.linalg.inv(np.diag(1 / k[through]) + F.T / k[other] @ Q)
-            by_branches[torques, through] = taken_up / k[through]
-            by_branches[torques, other] = -taken_up @ F.T / k[other]
-            by_inputs[torques, :laws] = by_branches[torques, other] @ self._cutsets[np.ix_(other, list(form.laws))]
-        by_stores = np.zeros((size, len(self._columns)))
-        by_stores[:, :stores] = by_branches[:, list(self._branches)]
-        by_stores[size - angles :, stores:] = np.eye(angles)
-        return by_stores, by_inputs
 
 
 LEAST = 1e-10
@@ -350,3 +325,9 @@ def _pressed(V: Array, b: Array) -> NDArray[np.bool_] | None:
             impulses[~active] = 0.0
         impulses = wanted
     return None
+
+
+def _full(part: LinearPart) -> tuple[Array, Array]:
+    """Loops and cutsets as full arrays."""
+    loops: Array = part.loops.toarray()
+    return loops, loops if part.cutsets is part.loops else part.cutsets.toarray()

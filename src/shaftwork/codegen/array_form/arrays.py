@@ -40,11 +40,6 @@ class ArrayProgram:
     def __reduce__(self) -> tuple[Any, ...]:
         return ArrayProgram, (self.form,)  # compiled code cannot be stored
 
-    @property
-    def potentials(self) -> GainMatrix:
-        """(nodes, branches): the across variable of every node from those of the tree branches."""
-        return self.assembly.potentials
-
     @cached_property
     def shares(self) -> GainMatrix:
         """(nodes, branches): what passes through the tree branches where a unit is put in at a node."""
