@@ -59,11 +59,10 @@ def runs_of(rows: Rows) -> tuple[Stencil, ...]:
             runs[-1] = replace(runs[-1], count=runs[-1].count + 1)
         else:
             runs.append(Stencil(i, 1, relative))
-    apart = (
-        [run] if run.count >= SHORTEST else [Stencil(run.first + k, 1, run.rate) for k in range(run.count)]
-        for run in runs
-    )
-    return tuple(chain.from_iterable(apart))
+    written: list[Stencil] = []
+    for run in runs:
+        written += [run] if run.count >= SHORTEST else [Stencil(run.first + k, 1, run.rate) for k in range(run.count)]
+    return tuple(written)
 
 
 class _C(RealNumbers, C99CodePrinter):  # type: ignore[misc]
