@@ -29,26 +29,20 @@ class Way(NamedTuple):
         defect: a step is taken when its equation is left with less than this fraction of the rates.
         nearby: so far ahead, s, a law is asked for its slope where it has none.
         standstill: it ends when the last step changed the states by no more than this fraction.
+        steps: at most so many are tried.
     """
 
     first: float = 1e-6
     defect: float = 0.3
     nearby: tuple[float, ...] = (1e-9, 1e-7)
     standstill: float = 1e-6
+    steps: int = 2000
 
 
 WAY = Way()
 
 
-def steady_state(
-    bound: BoundArrays,
-    start: Array,
-    t: float,
-    *,
-    tolerance: float = 1e-12,
-    limit: int = 2000,
-    ends: Callable[[Array], bool] | None = None,
-) -> Array:
+def steady_state(bound: BoundArrays, start: Array, t: float, *, ends: Callable[[Array], bool] | None = None) -> Array:
     """States at which nothing changes, reached from a start the way the drive itself would reach it.
 
     Where `ends` says of states that other equations hold there, the way ends just beyond.
@@ -76,9 +70,9 @@ def steady_state(
     x = np.array(start, dtype=float)
     rate, step = counts * bound.rhs(t, x), np.zeros_like(x)
     h = WAY.first
-    for _ in range(limit):
+    for _ in range(WAY.steps):
         slopes = counted @ _slopes(bound, t, x, rate)
-        vanishing = tolerance * _rate_sizes(bound, t, x, slopes, length(x) / weights * (EPS / tolerance))
+        vanishing = ROUNDING * _rate_sizes(bound, t, x, slopes, length(x) / weights * (EPS / ROUNDING))
         settled = np.linalg.norm(step) <= WAY.standstill * np.linalg.norm(x)  # a drive that runs away is not steady
         if settled and (np.abs(rate) <= vanishing).all():
             return x
