@@ -42,7 +42,8 @@ class LoopSolver:
         in_tree: which of them are in the tree, in the order of the rows of P and Q.
         p: parameter vector.
         beside_waves: the parts of the laws, where lines are at their nodes; there another solution is refused.
-        linear: whether all of them are laws of inertias, which are linear in the rates that they read.
+        linear: whether all of them are laws of inertias, linear in the rates that they read: solved at once for many
+            instants, in a third of the time of Newton's method.
     """
 
     def __init__(
