@@ -181,16 +181,14 @@ class HeyokaProgram:
             options = {"compact_mode": True, "opt_level": 0}
             self._functions[name] = heyoka.cfunc(list(expressions), vars=list(self.variables), **options)
         compiled = self._functions[name]
-        values: Array = compiled(x, pars=parameters[: compiled.nparams], time=t)
-        return values
+        return np.asarray(compiled(x, pars=parameters[: compiled.nparams], time=t))
 
     def switch_signs(self, t: float, x: Array, parameters: Array, unchanged: Array | None = None) -> Array:
         """Signs of the switches (k,) at time t in s, state x (n,) and the parameters (p,) before the signs.
 
         Those of `unchanged` (k,) that are not zero are taken as they are.
         """
-        unchanged = np.zeros(len(self.switches)) if unchanged is None else unchanged
-        signs = unchanged
+        signs = unchanged = np.zeros(len(self.switches)) if unchanged is None else unchanged
         # A switch may depend on the sign of an earlier one: the maximum of three compares with the maximum of two.
         for left in reversed(range(len(self.switches))):
             values = self.switch_values(t, x, np.concatenate([parameters, signs]))
@@ -359,7 +357,6 @@ def build(
     translator = Translator(states, time, parameters, stepping, fixed)
     translated = tuple(translator.expression(row) for row in rows)
     watched = tuple(translator.expression(guard) for guard in guards)
-    moving = frozenset(states)
     return HeyokaProgram(
         translator.variables,
         translated,
@@ -372,7 +369,7 @@ def build(
         guards=watched,
         held=HeldParameters(translator.held, translator.variables, first) if stepping else None,
         stepping=np.array(translator.stepping, dtype=bool),
-        singular=any(_singular(node, moving, time) for row in rows for node in row.atoms(sympy.Pow, *POLES)),
+        singular=any(_singular(node, frozenset(states), time) for row in rows for node in row.atoms(sympy.Pow, *POLES)),
     )
 
 
