@@ -193,7 +193,7 @@ def test_the_page_of_the_interface_has_every_public_name() -> None:
 
 
 def test_every_kind_of_problem_on_the_page_is_one_of_the_code() -> None:
-    names = ("diagnosis", "value_diagnosis", "controlled_sources")
+    names = ("diagnosis", "value_diagnosis", "view")
     sources = ("network/checks.py", "components/drives.py", *(f"formulation/{name}.py" for name in names))
     code = "".join((ROOT / "src/shaftwork" / source).read_text(encoding="utf-8") for source in sources)
     table = re.findall(r"^\| ([a-z, ]+) \| (?:error|warning|note) \|", TEXTS["diagnosis.md"], re.MULTILINE)

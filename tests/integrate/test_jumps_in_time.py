@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 import shaftwork as sw
-from shaftwork.codegen.times.timeline import timeline
+from shaftwork.codegen.timeline import timeline
 from tests.properties.examples import share_of_examples
 
 pytestmark = pytest.mark.filterwarnings("ignore:jumping source:shaftwork.core.errors.NetworkWarning")
@@ -303,7 +303,7 @@ def test_a_jump_of_a_table_over_a_sine_is_found_at_every_point_that_is_passed() 
 
 
 def test_locating_is_done_once_for_equal_runs(monkeypatch: pytest.MonkeyPatch) -> None:
-    from shaftwork.codegen.times import time_switches
+    from shaftwork.codegen import time_switches
 
     asked = []
     original = time_switches.sampled

@@ -23,8 +23,6 @@ SETTINGS = {"fully_qualified_modules": False, "inline": True, "allow_unknown_fun
 SCALAR = {**vars(math), **NUMERICAL}
 VECTORISED = {**vars(np), "reduce": reduce, **NUMERICAL}
 SHARED = re.compile(r"\bs\d+\b")
-KEPT = 4096
-"""Functions of single laws that are kept: the same ones come back in every set of equations."""
 Moves = Sequence[tuple[float, float, float, float]]
 """How states move; see `around`."""
 
@@ -274,15 +272,9 @@ def _reading(
     return FloatPrinter(names), lines
 
 
-def vectorised(symbols: Sequence[Symbol], expression: Expr) -> Callable[..., Any]:
-    """An expression as a function of arrays or floats."""
-    return _vectorised(tuple(symbols), expression)
-
-
-@lru_cache(maxsize=KEPT)
-def _vectorised(symbols: tuple[Symbol, ...], expression: Expr) -> Callable[..., Any]:
-    if len(symbols) == 1 and expression == symbols[0]:
-        return lambda value: value
+@lru_cache(maxsize=4096)
+def vectorised(symbols: tuple[Symbol, ...], expression: Expr) -> Callable[..., Any]:
+    """An expression as a function of arrays or floats; kept, as the same laws come back in every set of equations."""
     return vectorised_list(symbols, expression)
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from importlib.util import find_spec
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from sympy import Symbol, count_ops, cse
@@ -28,12 +28,20 @@ from shaftwork.formulation.form import StateForm
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.kinds import Kind
 
-SCALAR_STATES, SCALAR_BRANCHES = 64, 400
-"""Above this many states or branches the unrolled code costs more to make than it saves."""
-SWITCHING_STATES, SWITCHING_BRANCHES, FEW_SETS = 1200, 6000, 4
-"""The same where parts change their mode, within no more than so many sets of equations: each event is looked at by
+
+class Largest(NamedTuple):
+    """Up to how many states and branches unrolled code saves more than it costs to make."""
+
+    states: int
+    branches: int
+
+
+SCALAR, SWITCHING = Largest(64, 400), Largest(1200, 6000)
+"""Of all networks, and of those whose parts change their mode in few sets of equations: each event is looked at by
 itself, which takes arrays 50 times as long as scalar code. 65 states with 114 events: 1.2 s, then 0.03 s a run, and
 4.5 s by arrays; 385 states with 261 events: 4 s, then 0.7 s, and 15 s by arrays."""
+FEW_SETS = 4
+"""So many sets of equations are few."""
 
 
 @dataclass(frozen=True)
@@ -133,9 +141,8 @@ class CompiledModel:
     def rows_of(self, sets: int) -> Rows | None:
         """The same where the motion may lead through so many sets of equations; none where no part changes its mode."""
         states, branches = len(self.form.states), len(self.form.graph.branches)
-        switches = 0 < sets <= FEW_SETS
-        most = (SWITCHING_STATES, SWITCHING_BRANCHES) if switches else (SCALAR_STATES, SCALAR_BRANCHES)
-        if self.form.waves or states > most[0] or branches > most[1]:
+        largest = SWITCHING if 0 < sets <= FEW_SETS else SCALAR
+        if self.form.waves or states > largest.states or branches > largest.branches:
             return None
         try:
             return explicit_rows(self.form)

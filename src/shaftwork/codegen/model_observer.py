@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -12,13 +12,38 @@ from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array, blocks
 from shaftwork.codegen.array_form.recovery import BranchHistory, branches_with_power
 from shaftwork.codegen.state_transfer import StateTransfer
-from shaftwork.codegen.times.timeline import NOTHING, Timeline
-from shaftwork.codegen.waves import DenseWaves, WaveReadings, along_lines
+from shaftwork.codegen.timeline import NOTHING, Timeline
 from shaftwork.components.base import Component, Profile
 from shaftwork.core.errors import SignalError
 from shaftwork.formulation.form import Names, StateForm
 from shaftwork.network.graph import CircuitGraph, GraphPart
 from shaftwork.network.kinds import Kind
+
+
+class DenseWaves(Protocol):
+    """States, and histories behind them, at any time."""
+
+    @property
+    def steps(self) -> Array:
+        """Ends of the steps, the start first, s."""
+        ...
+
+    def __call__(self, times: Array) -> Array:
+        """(k, n) at times (k,)."""
+        ...
+
+
+@runtime_checkable
+class WaveReadings(Protocol):
+    """What a motion of a network with lines can tell besides."""
+
+    def held(self, times: Array) -> Array:
+        """(k, lines) energy in J that is on its way in each line at times (k,)."""
+        ...
+
+    def leaving(self, times: Array) -> Array:
+        """(k, ends) the waves 2 Z v + h in N m that leave the ends at times (k,), also before the start."""
+        ...
 
 
 class Impact(NamedTuple):
@@ -146,7 +171,7 @@ class ModelObserver:
         """(k, places) a quantity along a part by its name in `profiles`."""
         part, profile = self._profiles[name]
         if profile.lines:
-            return along_lines(self._bind(), part, profile, t, _carrying(dense))
+            return _along_lines(self._bind(), part, profile, t, _carrying(dense))
         return self._read(t, x, lambda history: history.profile(part, profile))
 
     def impacts(self, dense: DenseWaves) -> tuple[Impact, ...]:
@@ -194,9 +219,6 @@ class ModelObserver:
         templates = (self._graph.branches[k].template for k in branches_with_power(self._graph, part))
         return any(one.kind in (Kind.ACROSS_STORE, Kind.THROUGH_STORE) or one.stored != 0 for one in templates)
 
-    def _gives_back(self, part: GraphPart) -> bool:
-        return any(self._graph.branches[k].template.conservative for k in part.branches)
-
     def powers(self, t: Array, x: Array) -> tuple[dict[str, Array], dict[str, Array]]:
         """Lost and supplied power by part; of weights, and of sources with resistors or dampers of their own, both."""
         history = BranchHistory(self._bind(), self._instants.one_sided(t), x)
@@ -209,7 +231,8 @@ class ModelObserver:
             if Kind.CONDUCTANCE in kinds and len(kinds) > 1:  # a law that is linear in the speed is still a source
                 lost[part.name] = history.heat(part)
                 supplied[part.name] = supplied[part.name] + lost[part.name]
-        for part in (part for part in parts if part not in sources and self._gives_back(part)):
+        weights = (p for p in parts if any(self._graph.branches[k].template.conservative for k in p.branches))
+        for part in (part for part in weights if part not in sources):
             supplied[part.name] = -history.lifted(part)
             lost[part.name] = lost[part.name] + supplied[part.name]
         return lost, supplied
@@ -237,3 +260,20 @@ def _carrying(dense: DenseWaves | None) -> WaveReadings:
     if not isinstance(dense, WaveReadings):
         raise SignalError("A wave is on its way, and one instant does not tell it. Read it of a motion.")
     return dense
+
+
+def _along_lines(bound: BoundArrays, part: GraphPart, profile: Profile, t: Array, dense: WaveReadings) -> Array:
+    """(k, places) torque or speed along a part that is made of lines.
+
+    Law: tau = (f - g) / 2, omega = (f + g) / (2 Z), with f and g the waves that have left the two ends and come by.
+    """
+    ends, (impedances, delays) = bound.program.form.waves, bound.lines
+    labels = {bound.program.form.graph.branches[k].template.label: k for k in part.branches}
+    values = np.empty((len(t), len(profile.lines)))
+    for place, (label, share) in enumerate(profile.lines):
+        first = ends.index(labels[f"{label}_a" if f"{label}_a" in labels else f"{label}_middle"])
+        impedance, delay = float(impedances[first // 2]), float(delays[first // 2])
+        f = dense.leaving(t - share * delay)[:, first]
+        g = dense.leaving(t - (1 - share) * delay)[:, first + 1]
+        values[:, place] = (f - g) / 2 if profile.kind == "through" else (f + g) / (2 * impedance)
+    return values

@@ -6,14 +6,14 @@ What parameters alone tell is computed before the loops. The same loops are writ
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from sympy import Add, Basic, Expr, Function, Integer, Mul, Rational, Symbol
+from sympy import Basic, Expr, Function, Integer, Rational, Symbol
 from sympy.printing.c import C99CodePrinter
 from sympy.printing.str import StrPrinter
 
@@ -59,11 +59,10 @@ def runs_of(rows: Rows) -> tuple[Stencil, ...]:
             runs[-1] = replace(runs[-1], count=runs[-1].count + 1)
         else:
             runs.append(Stencil(i, 1, relative))
-    return tuple(one for run in runs for one in ([run] if run.count >= SHORTEST else _apart(run)))
-
-
-def _apart(run: Stencil) -> Iterator[Stencil]:
-    yield from (Stencil(run.first + k, 1, run.rate) for k in range(run.count))
+    written: list[Stencil] = []
+    for run in runs:
+        written += [run] if run.count >= SHORTEST else [Stencil(run.first + k, 1, run.rate) for k in range(run.count)]
+    return tuple(written)
 
 
 class _C(RealNumbers, C99CodePrinter):  # type: ignore[misc]
@@ -255,9 +254,21 @@ class RunProgram:
     @cached_property
     def _runs(self) -> tuple[tuple[Stencil, ...], dict[Symbol, Basic]]:
         """The runs in terms of what parameters alone tell, and that by symbols."""
-        runs = [replace(run, rate=_by_coefficient(run)) for run in runs_of(self._rows)]
-        constants = _Constants(self._rows.parameters, [run.rate for run in runs])
-        return tuple(replace(run, rate=constants.taken_out(run.rate)) for run in runs), constants.values
+        runs, symbols = runs_of(self._rows), dict[Basic, Symbol]()
+        free = dict.fromkeys(symbol for run in runs for symbol in run.rate.free_symbols)
+        moving = [symbol for symbol in free if symbol not in self._rows.parameters]
+        fixed = Fixed(self._rows.parameters, moving, [run.rate for run in runs])
+
+        def taken_out(node: Any) -> Any:
+            """With symbols in place of its largest parts of parameters alone."""
+            if node in fixed.places:
+                return symbols.setdefault(node, Symbol(f"c{len(symbols)}", real=True))
+            if not node.args or not node.free_symbols:
+                return node
+            return node.func(*map(taken_out, fixed.arguments(node)))
+
+        rates = tuple(replace(run, rate=taken_out(run.rate)) for run in runs)
+        return rates, {symbol: part for part, symbol in symbols.items()}
 
     def source(self, language: str) -> str:
         """The code in a language.
@@ -299,55 +310,7 @@ class RunProgram:
         return str(printer.doprint(expression))
 
 
-class _Constants:
-    """Symbols for what parameters alone tell in rates.
-
-    Args:
-        parameters: symbols.
-        rates: of all runs.
-    """
-
-    def __init__(self, parameters: Sequence[Symbol], rates: Sequence[Expr]) -> None:
-        free = dict.fromkeys(symbol for rate in rates for symbol in rate.free_symbols)
-        self._fixed = Fixed(parameters, [symbol for symbol in free if symbol not in parameters], rates)
-        self._symbols: dict[Basic, Symbol] = {}
-
-    @property
-    def values(self) -> dict[Symbol, Basic]:
-        """What each symbol stands for, in the order in which they were taken out."""
-        return {symbol: part for part, symbol in self._symbols.items()}
-
-    def taken_out(self, node: Any) -> Any:
-        """An expression with symbols in place of its largest parts of parameters alone."""
-        if node in self._fixed.places:
-            return self._symbols.setdefault(node, Symbol(f"c{len(self._symbols)}", real=True))
-        if not node.args or not node.free_symbols:
-            return node
-        return node.func(*map(self.taken_out, self._fixed.arguments(node)))
-
-
 def _read(rate: Expr) -> list[tuple[Symbol, int]]:
     """The states that a rate reads, and their distances."""
     states = (symbol for symbol in rate.free_symbols if symbol.name.startswith("x[i"))
     return sorted(((symbol, int(symbol.name[3:-1])) for symbol in states), key=lambda pair: pair[1])
-
-
-def _by_coefficient(run: Stencil) -> Expr:
-    """A rate that is linear in the states with what has the same coefficient together; others as they are."""
-    states = [symbol for symbol, _ in _read(run.rate)]
-    slopes = {symbol: run.rate.diff(symbol) for symbol in states}
-    if any(slope.has(*states) for slope in slopes.values()):
-        return run.rate
-    sums: dict[Expr, list[Expr]] = {}
-    for symbol, slope in slopes.items():
-        number, factor = slope.as_coeff_Mul()
-        sums.setdefault(factor, []).append(number * symbol)
-    rest = run.rate.xreplace(dict.fromkeys(states, Integer(0)))
-    total = Add(rest, *(symbol * slope for symbol, slope in slopes.items()))
-    if (run.rate - total).expand() != 0:  # of other pieces of a law, which may have the same slopes
-        return run.rate
-    terms = []
-    for factor, parts in sums.items():
-        least = min(abs(part.as_coeff_Mul()[0]) for part in parts)
-        terms.append(Mul(least * factor, Add(*(part / least for part in parts)), evaluate=False))
-    return Add(rest, *terms)

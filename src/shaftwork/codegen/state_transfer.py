@@ -7,6 +7,16 @@ torque of every spring, every angle. New equations take it up with the least cha
     (1/L + F_SL' Q_SL / S) x_L = i_L / L - F_SL' (i_S + Q_SW w) / S,
 
 which is an inelastic impact: it keeps every momentum that nothing outside takes away.
+
+Beside it stands how speeds across parts change by impulses, and which impulses keep contacts from closing further.
+Impulses lambda at pairs of nodes change the speeds v of inertias at once, and no torque counts beside them:
+
+    M (v' - v) = S' lambda,    u = R v + R_E e,    u' = u + W lambda,    W = R M^-1 S',
+
+with M the inertias in the states and of all that turns with them, R and R_E the speeds across the pairs from those of
+the states and from prescribed ones, and S the shares of impulses that arrive at the states: R itself but where a
+coupling loses power. Contacts press and never pull: lambda >= 0, w = W lambda + q >= 0, lambda w = 0, a linear
+complementarity problem. Source: Brogliato, Nonsmooth Mechanics, 2016, section 5.
 """
 
 from __future__ import annotations
@@ -15,14 +25,16 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shaftwork.codegen.array_form.arrays import BoundArrays
-from shaftwork.codegen.array_form.elements import Array
+from shaftwork.codegen.array_form.elements import ROUNDING, SAME, Array
 from shaftwork.codegen.array_form.matrices import LinearPart
 from shaftwork.codegen.array_form.recovery import BranchHistory
-from shaftwork.codegen.mobility import Mobility
 from shaftwork.core.errors import CompileError
+from shaftwork.core.kept import Kept
 from shaftwork.formulation.form import StateForm, store_name
+from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind
 
 
@@ -46,7 +58,7 @@ class StateTransfer:
         self.through = tuple(name for name, template in templates if template.kind is Kind.THROUGH_STORE)
         """Those of the names that are torques of springs or currents of inductors."""
         self._states = [state.name for state in form.states]
-        self._maps: _Maps | None = None
+        self._to_stores, self._to_states = Kept[LinearPart, Array](1), Kept[LinearPart, tuple[Array, Array]](1)
 
     @cached_property
     def _columns(self) -> list[int]:
@@ -68,19 +80,27 @@ class StateTransfer:
         """
         if -1 not in self._columns:
             return x[:, self._columns]
-        states = x[:, : len(self._states)]  # waves may follow them
-        return states @ self._maps_of(bind().part).to_stores if self.by_loops else self._recovered(bind(), t, x)
+        if not self.by_loops:
+            return self._recovered(bind(), t, x)
+        part = bind().part
+        return x[:, : len(self._states)] @ self._to_stores(part, lambda: self._store_map(part))  # waves may follow
 
     def at_once(self, bind: Callable[[], BoundArrays], t: float, x: Array) -> dict[str, float]:
         """All that is stored at one time in s with the states (n,), by name; without full matrices."""
         values = x[self._columns] if -1 not in self._columns else self._recovered(bind(), np.array([t]), x[None, :])[0]
         return dict(zip(self.names, values.tolist(), strict=True))
 
-    def _maps_of(self, part: LinearPart) -> _Maps:
-        """The maps between states and stores; the last ones are kept."""
-        if self._maps is None or self._maps.part is not part:
-            self._maps = _Maps(self._form, part, tuple(self.branches.values()), self._columns)
-        return self._maps
+    def _store_map(self, part: LinearPart) -> Array:
+        """(n, stores) what states are multiplied by, where stores follow from loops and cutsets alone."""
+        form, matrix, (loops, cutsets) = self._form, np.zeros((len(self._states), len(self.names))), _full(part)
+        for column, (name, state) in enumerate(zip(self.names, self._columns, strict=True)):
+            if state >= 0:
+                matrix[state, column] = 1.0
+            elif (branch := self.branches[name]) in form.tree.loops:
+                matrix[form.speeds, column] = loops[list(form.across_states), branch]
+            else:
+                matrix[form.torques, column] = -cutsets[branch, list(form.through_states)]
+        return matrix
 
     def _recovered(self, bound: BoundArrays, t: Array, x: Array) -> Array:
         history, columns = BranchHistory(bound, t, x), []
@@ -103,11 +123,35 @@ class StateTransfer:
         """
         if not (self._form.dependent_across or self._form.dependent_through):
             return np.array([stored[name] for name in self._states])
-        by_stores, by_inputs = self._maps_of(bound.part).to_states
+        by_stores, by_inputs = self._to_states(bound.part, lambda: self._state_maps(bound.part))
         x = by_stores @ np.array([stored[name] for name in self.names])
         if by_inputs.any():
             x += by_inputs @ bound.program.inputs.sources(t, x, bound.p)
         return np.asarray(x)
+
+    def _state_maps(self, part: LinearPart) -> tuple[Array, Array]:
+        """(n, stores) and (n, m) what stores and inputs are multiplied by in the states that equations start with."""
+        form, k, laws, (loops, cutsets) = self._form, part.coefficients, len(self._form.laws), _full(part)
+        size, angles, stores = len(form.states), len(form.integrals), len(self.branches)
+        by_branches, by_inputs = np.zeros((size, len(k))), np.zeros((size, laws + len(form.across_inputs)))
+        across, through = list(form.across_states), list(form.through_states)
+        speeds, torques = form.speeds, form.torques
+        by_branches[speeds, across], by_branches[torques, through] = np.eye(len(across)), np.eye(len(through))
+        if other := list(form.dependent_across):
+            F, Q = (matrix[np.ix_(across, other)] for matrix in (loops, cutsets))
+            taken_up = np.linalg.inv(np.diag(k[across]) + Q * k[other] @ F.T)
+            by_branches[speeds, across], by_branches[speeds, other] = taken_up * k[across], taken_up @ Q * k[other]
+            by_inputs[speeds, laws:] = -by_branches[speeds, other] @ loops[np.ix_(list(form.across_inputs), other)].T
+        if other := list(form.dependent_through):
+            F, Q = (matrix[np.ix_(other, through)] for matrix in (loops, cutsets))
+            taken_up = np.linalg.inv(np.diag(1 / k[through]) + F.T / k[other] @ Q)
+            by_branches[torques, through] = taken_up / k[through]
+            by_branches[torques, other] = -taken_up @ F.T / k[other]
+            by_inputs[torques, :laws] = by_branches[torques, other] @ cutsets[np.ix_(other, list(form.laws))]
+        by_stores = np.zeros((size, len(self.names)))
+        by_stores[:, :stores] = by_branches[:, list(self.branches.values())]
+        by_stores[size - angles :, stores:] = np.eye(angles)
+        return by_stores, by_inputs
 
     def energy(self, bound: BoundArrays, stored: Mapping[str, float]) -> float:
         """What is stored, in J: k v^2 / 2 in inertias and masses, tau^2 / 2 c in springs."""
@@ -132,7 +176,7 @@ class StateTransfer:
             part = self._form.graph.part_of(self._form.inertial[0]).name
             raise CompileError(f"An impulse meets '{part}', whose inertia changes: no impact can be told there.")
         program = bound.program
-        nodes, shares = (matrix(bound.p).toarray() for matrix in (program.potentials, program.shares))
+        nodes, shares = (matrix(bound.p).toarray() for matrix in (program.assembly.potentials, program.shares))
         return Mobility(self._form, bound, nodes, shares, pairs)
 
     def impulses(self, bound: BoundArrays, gained: Mapping[str, float]) -> Array:
@@ -185,59 +229,105 @@ class StateTransfer:
         return {part: energy for part, energy in energies.items() if energy}
 
 
-class _Maps:
-    """The maps between states and stores with the matrices of one parameter vector.
+LEAST = 1e-10
+"""What is added to the diagonal of a matrix of ones, so that of many solutions the least one is found."""
+WITHOUT_INERTIA = (Kind.CONDUCTANCE, Kind.LAW, Kind.THROUGH_STORE)
+"""Kinds of tree branches whose across variables follow from torques."""
+
+
+class Mobility:
+    """The answer of a network to impulses at pairs of nodes.
 
     Args:
-        form: the state form.
-        part: the matrices.
-        branches: of the stores.
-        columns: of every store and angle its place among the states, or -1.
+        form: the equations.
+        bound: the same with their parameters.
+        nodes: (nodes, branches) the across variables of nodes from those of tree branches.
+        shares: (nodes, branches) what passes through tree branches where a unit is put in at nodes.
+        pairs: first and second node of each pair; +lambda raises the speed of the first one.
     """
 
-    def __init__(self, form: StateForm, part: LinearPart, branches: Sequence[int], columns: Sequence[int]) -> None:
-        self.part, self._form, self._branches, self._columns = part, form, branches, columns
-        self._loops: Array = part.loops.toarray()
-        self._cutsets: Array = self._loops if part.cutsets is part.loops else part.cutsets.toarray()
+    def __init__(
+        self, form: StateForm, bound: BoundArrays, nodes: Array, shares: Array, pairs: Sequence[tuple[int, int]]
+    ) -> None:
+        part, k = bound.part, bound.part.coefficients
+        across, links = list(form.across_states), list(form.dependent_across)
+        massless = [branch for kind in WITHOUT_INERTIA for branch in form.tree.tree[kind]]
+        rows, pushes = _rows(nodes, pairs), _rows(shares, pairs)
+        self.has_inertia: NDArray[np.bool_] = ~(rows[:, massless] != 0).any(axis=1)
+        """(pairs,) whether the speeds of inertias and prescribed ones tell the speed across; else no impulse passes."""
+        rows[~self.has_inertia] = pushes[~self.has_inertia] = 0.0
+        loops, cutsets = part.loops[across][:, links].toarray(), part.cutsets[across][:, links].toarray()
+        mass = np.diag(k[across]) + cutsets * k[links] @ loops.T
+        self._pushes, self._answers = pushes, np.linalg.solve(mass, pushes[:, across].T)
+        self.W = rows[:, across] @ self._answers
+        """(pairs, pairs) changes of the speeds across by unit impulses."""
 
-    @cached_property
-    def to_stores(self) -> Array:
-        """(n, stores) what states are multiplied by, where stores follow from loops and cutsets alone."""
-        form, matrix = self._form, np.zeros((len(self._form.states), len(self._columns)))
-        for column, state in enumerate(self._columns):
-            if state >= 0:
-                matrix[state, column] = 1.0
-                continue
-            branch = self._branches[column]
-            if branch in form.tree.loops:
-                matrix[form.speeds, column] = self._loops[list(form.across_states), branch]
-            else:
-                matrix[form.torques, column] = -self._cutsets[branch, list(form.through_states)]
-        return matrix
+    def moved(self, x: Array, impulses: Array) -> Array:
+        """(n,) the states after impulses (pairs,)."""
+        new = x.copy()
+        new[: len(self._answers)] += self._answers @ impulses
+        return new
 
-    @cached_property
-    def to_states(self) -> tuple[Array, Array]:
-        """(n, stores) and (n, m) what stores and inputs are multiplied by in the states that equations start with."""
-        form, k, laws = self._form, self.part.coefficients, len(self._form.laws)
-        size, angles, stores = len(form.states), len(form.integrals), len(self._branches)
-        by_branches, by_inputs = np.zeros((size, len(k))), np.zeros((size, laws + len(form.across_inputs)))
-        across, through = list(form.across_states), list(form.through_states)
-        speeds, torques = form.speeds, form.torques
-        by_branches[speeds, across], by_branches[torques, through] = np.eye(len(across)), np.eye(len(through))
-        if other := list(form.dependent_across):
-            F, Q = (matrix[np.ix_(across, other)] for matrix in (self._loops, self._cutsets))
-            taken_up = np.linalg.inv(np.diag(k[across]) + Q * k[other] @ F.T)
-            by_branches[speeds, across], by_branches[speeds, other] = taken_up * k[across], taken_up @ Q * k[other]
-            by_inputs[speeds, laws:] = (
-                -by_branches[speeds, other] @ self._loops[np.ix_(list(form.across_inputs), other)].T
-            )
-        if other := list(form.dependent_through):
-            F, Q = (matrix[np.ix_(other, through)] for matrix in (self._loops, self._cutsets))
-            taken_up = np.linalg.inv(np.diag(1 / k[through]) + F.T / k[other] @ Q)
-            by_branches[torques, through] = taken_up / k[through]
-            by_branches[torques, other] = -taken_up @ F.T / k[other]
-            by_inputs[torques, :laws] = by_branches[torques, other] @ self._cutsets[np.ix_(other, list(form.laws))]
-        by_stores = np.zeros((size, len(self._columns)))
-        by_stores[:, :stores] = by_branches[:, list(self._branches)]
-        by_stores[size - angles :, stores:] = np.eye(angles)
-        return by_stores, by_inputs
+    def through(self, impulses: Array) -> Array:
+        """(branches,) what of impulses (pairs,) passes through tree branches, beside what dependent inertias take."""
+        return np.asarray(impulses @ self._pushes)
+
+
+def _rows(nodes: Array, pairs: Sequence[tuple[int, int]]) -> Array:
+    """(pairs, branches) differences of the rows of nodes; that of the ground is zero."""
+    ground = np.zeros(nodes.shape[1])
+    ends = [[ground if node == GROUND else nodes[node] for node in pair] for pair in pairs]
+    return np.array([plus - minus for plus, minus in ends]).reshape(len(pairs), nodes.shape[1])
+
+
+def complementary(W: Array, q: Array) -> Array | None:
+    """(m,) lambda >= 0 with w = W lambda + q >= 0 and lambda w = 0, or None where there is none.
+
+    W is symmetric and positive semidefinite, so it is the least square of what A lambda leaves of b with W = A' A,
+    q = -A' b, solved by an active set. W lambda is unique, and so are speeds. Where lambda is not, as of contacts side
+    by side, it is the least one, which they share: their order says nothing. Beside couplings that lose
+    power W is not symmetric: the same active set is sought, and None says as well that it was not found.
+
+    Source: Lawson and Hanson, Solving Least Squares Problems, 1974, chapter 23.
+    """
+    scale = np.diag(W)
+    if (q[scale <= 0] < 0).any():
+        return None
+    scale = np.where(scale > 0, 1 / np.sqrt(np.where(scale > 0, scale, 1.0)), 0.0)
+    V, b = W * scale[:, None] * scale, q * scale
+    pressed = _pressed(V + LEAST * np.eye(len(q)), b)
+    if pressed is None:
+        return None
+    shares = np.zeros(len(q))
+    shares[pressed] = np.linalg.lstsq(V[np.ix_(pressed, pressed)], -b[pressed], rcond=ROUNDING)[0]
+    keeps = V @ shares + b > -SAME * np.abs(b).max(initial=0.0)
+    return np.maximum(shares, 0.0) * scale if keeps.all() else None
+
+
+def _pressed(V: Array, b: Array) -> NDArray[np.bool_] | None:
+    """(m,) where lambda > 0, for a positive definite matrix; None where rounding hides it."""
+    least = ROUNDING * np.abs(b).max(initial=0.0)
+    impulses, active = np.zeros(len(b)), np.zeros(len(b), dtype=bool)
+    for _ in range(3 * len(b) + 1):
+        w = np.where(active, 0.0, V @ impulses + b)
+        if not (w < -least).any():
+            return active
+        active[np.argmin(w)] = True
+        while True:
+            wanted = np.zeros(len(b))
+            wanted[active] = np.linalg.solve(V[np.ix_(active, active)], -b[active])
+            pulls = active & (wanted <= 0)
+            if not pulls.any():
+                break
+            shares = impulses[pulls] / (impulses[pulls] - wanted[pulls])
+            impulses += shares.min() * (wanted - impulses)
+            active &= ~(pulls & (impulses <= ROUNDING * np.abs(impulses).max(initial=0.0)))
+            impulses[~active] = 0.0
+        impulses = wanted
+    return None
+
+
+def _full(part: LinearPart) -> tuple[Array, Array]:
+    """Loops and cutsets as full arrays."""
+    loops: Array = part.loops.toarray()
+    return loops, loops if part.cutsets is part.loops else part.cutsets.toarray()

@@ -36,7 +36,7 @@ def breakpoints(expression: sympy.Basic, values: Mapping[sympy.Symbol, float] | 
     Found are comparisons, Heaviside, sign, Abs, Max, Min and tables of arguments that are linear in `t`. A switch that
     depends on a state has no time that is known beforehand and is left out, as is one that depends on a nonlinear
     function of time, or that is one of endlessly many: those are found in the span of a run
-    (`codegen.times.time_switches`). A listed time need not be a kink (equal slopes on both sides).
+    (`codegen.time_switches`). A listed time need not be a kink (equal slopes on both sides).
 
     Args:
         expression: a law or any expression that contains laws.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -14,14 +14,13 @@ from shaftwork.components.discontinuities import breakpoints
 from shaftwork.components.laws import t
 from shaftwork.components.tables import InterpolationSlope
 from shaftwork.core.errors import Diagnostic
-from shaftwork.formulation.controlled_sources import controlled_problems, reads_itself
 from shaftwork.formulation.form import StateForm, state_form
 from shaftwork.formulation.gains import value_of
 from shaftwork.formulation.tree import column_of
 from shaftwork.formulation.value_diagnosis import extreme_ratios, notes_of, numeric_problems
-from shaftwork.formulation.view import View, words_of
+from shaftwork.formulation.view import View, controlled_problems, reads_itself, words_of
 from shaftwork.network.checks import LEFT_OUT, connection_problems, examine
-from shaftwork.network.graph import CircuitGraph, GraphPart, build_graph
+from shaftwork.network.graph import CircuitGraph, GraphBranch, GraphPart, build_graph
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import Netlist
 from shaftwork.network.wording import at_nodes, listed, title
@@ -139,8 +138,7 @@ class _Structure(View):
             losses = [other for other in self.tree.loops.get(law, ()) if self.kind(other) is Kind.CONDUCTANCE]
             if law in self.tree.loops and not (losses and reads_itself(self, law)):
                 continue
-            moved = [node for other in losses or [law] for node in self.moved[other]]
-            nodes = self.nodes(node for node in moved if node in (branch.plus, branch.minus)) or self.nodes(moved)
+            nodes = self._moved_by(branch, losses or [law])
             beside = f"beside {self.titles(losses)}, " if losses else ""
             message = (
                 f"{at_nodes(nodes)} has no {words.store}: {beside}the {words.through} of {self.titles([law])} and the "
@@ -156,14 +154,18 @@ class _Structure(View):
             if not laws:
                 continue
             branch, words = self.graph.branches[spring], self.words(spring)
-            moved = self.moved[spring]
-            nodes = self.nodes(node for node in moved if node in (branch.plus, branch.minus)) or self.nodes(moved)
+            nodes = self._moved_by(branch, [spring])
             message = (
                 f"{at_nodes(nodes)} has no {words.store}: the {words.through} of {self.titles([spring])} would be that "
                 f"of {self.titles(laws)} at every instant, and jump where its mode changes."
             )
             hint = f"Give the node some {words.store}, however small{self.spelling.suggestion(nodes)}."
             yield Diagnostic("massless node", message, hint, self.parts([spring, *laws]), nodes)
+
+    def _moved_by(self, branch: GraphBranch, trees: Iterable[int]) -> tuple[str, ...]:
+        """The nodes that tree branches move: those at the ends of a branch, else all."""
+        moved = [node for tree in trees for node in self.moved[tree]]
+        return self.nodes(node for node in moved if node in (branch.plus, branch.minus)) or self.nodes(moved)
 
     def _holds(self, law: int) -> bool:
         """Whether the part of a law holds in another mode, up to a torque: a friction, a brake."""

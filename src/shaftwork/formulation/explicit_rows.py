@@ -138,10 +138,11 @@ class _Solution:
         matrix: dict[tuple[int, int], Expr] = {(tree, tree): self.form.law_of(tree) for tree in unknowns}
         for link in form.link_conductances:
             g, drive = self.form.law_of(link), self.around(link)
-            self._add_products(matrix, link, g, frozenset(unknowns))
-            for tree, gain in self.balances[link]:
-                if tree in right:
-                    right[tree] -= gain * g * drive
+            members = [(tree, gain) for tree, gain in self.loops[link] if tree in right]
+            for first, gain in ((tree, gain) for tree, gain in self.balances[link] if tree in right):
+                right[first] -= gain * g * drive
+                for second, other in members:
+                    matrix[first, second] = matrix.get((first, second), Integer(0)) + gain * g * other
         self.across.update(zip(unknowns, solve_blocks(matrix, unknowns, right), strict=True))
 
     def _speed_rates(self) -> tuple[Expr, ...]:
@@ -180,15 +181,6 @@ class _Solution:
                 for second, other in states:
                     matrix[first, second] = matrix.get((first, second), Integer(0)) + gain * compliance * other
         return solve_blocks(matrix, unknowns, right)
-
-    def _add_products(
-        self, matrix: dict[tuple[int, int], Expr], link: int, coefficient: Expr, unknowns: frozenset[int]
-    ) -> None:
-        """Add coefficient * q f' for the columns q and f of a link in the cutsets and loops."""
-        members = [(tree, gain) for tree, gain in self.loops[link] if tree in unknowns]
-        for first, gain in ((tree, gain) for tree, gain in self.balances[link] if tree in unknowns):
-            for second, other in members:
-                matrix[first, second] = matrix.get((first, second), Integer(0)) + gain * coefficient * other
 
 
 def _exact(form: StateForm, rows: Mapping[int, Row]) -> dict[int, tuple[tuple[int, Expr], ...]]:

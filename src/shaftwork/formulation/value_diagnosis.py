@@ -23,7 +23,7 @@ from shaftwork.network.kinds import Kind
 from shaftwork.network.wording import at_nodes, listed, title
 
 SINGULAR = 1e-13
-"""Reciprocal condition below which coupled values cancel; the same as in the assembly of the matrices."""
+"""Reciprocal condition below which coupled values cancel, and a block of equations has no solution to speak of."""
 
 
 def numeric_problems(form: StateForm) -> tuple[Diagnostic, ...]:
@@ -140,7 +140,7 @@ def _cancelling(form: StateForm, unknowns: Sequence[int], beside: Sequence[int])
         trees, links = sorted(block & members), sorted(block - members)
         F, Q = (_block(rows, trees, links, form.graph.parameters) for rows in (form.tree.loops, form.tree.cutsets))
         matrix = np.diag([values[tree] for tree in trees]) + Q * [values[link] for link in links] @ F.T
-        if min(values[branch] for branch in block) <= 0 and _is_singular(matrix):
+        if min(values[branch] for branch in block) <= 0 and is_singular(matrix):
             yield _cancelling_block(View(form), (*trees, *links))
 
 
@@ -156,7 +156,8 @@ def _coefficients(graph: CircuitGraph, branches: Iterable[int], parameters: Mapp
     return values
 
 
-def _is_singular(block: Any) -> bool:
+def is_singular(block: Any) -> bool:
+    """Whether coupled values cancel in a matrix, whatever the sizes of its rows."""
     scale = 1 / np.sqrt(np.abs(np.diag(block)) + np.finfo(float).tiny)
     scaled = block * scale[:, None] * scale[None, :]
     return not (np.isfinite(scaled).all() and 1 / np.linalg.cond(scaled) > SINGULAR)
@@ -175,8 +176,6 @@ def _cancelling_block(view: View, branches: Sequence[int]) -> Diagnostic:
 
 _JOINTS = (Kind.THROUGH_STORE, Kind.COUPLING)
 """Springs and gears: what hands a torque on at standstill."""
-PAIR = 2
-"""Ends of a spring, or shafts of a gear of two."""
 _SLIPPING_OR_STUCK = 3
 """Modes of what rubs at all times: forward, backward, stuck; a brake has more."""
 
@@ -195,7 +194,9 @@ def notes_of(graph: CircuitGraph) -> Iterator[Diagnostic]:
 def _against(graph: CircuitGraph, start: int, torque: float) -> str:
     """The loads behind a node that rest until a torque there is above theirs, in words; losses of gears left out."""
     columns = (column_of(graph, branch) for branch in graph.branches if branch.template.kind in _JOINTS)
-    pairs = ({node: value_of(factor) for node, factor in column.items()} for column in columns if len(column) == PAIR)
+    pairs = (
+        {node: value_of(factor) for node, factor in column.items()} for column in columns if len(column) == 2
+    )  # ends of a spring, or shafts of a gear of two
     speeds = speeds_along(graph, start, pairs)
     loads: dict[str, float] = {}
     for part in graph.parts:

@@ -12,8 +12,8 @@ from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.array_form.inputs import is_linear
 from shaftwork.codegen.compiled_model import CompiledModel
-from shaftwork.codegen.starts.start_values import Start, initial_state
-from shaftwork.codegen.starts.wound_shafts import inner_nodes, node_of, speed_at
+from shaftwork.codegen.start_names import inner_nodes, node_of, speed_at
+from shaftwork.codegen.start_values import Start, initial_state
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.law_slopes import jumps, slope
 from shaftwork.components.laws import t as TIME

@@ -12,7 +12,7 @@ import numpy as np
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.array_form.recovery import BranchHistory
 from shaftwork.codegen.model_observer import ModelObserver
-from shaftwork.codegen.starts.start_values import initial_state
+from shaftwork.codegen.start_values import initial_state
 from shaftwork.components.modes import ModeChoice
 from shaftwork.components.shaft_models import MOST_SPECTRAL, OneSpring, Rigid, Spectral, Wave
 from shaftwork.components.shafts import Shaft

@@ -20,8 +20,7 @@ from shaftwork.codegen.array_form.arrays import ArrayProgram, BoundArrays
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.array_form.recovery import BranchHistory, GivenHistory, branches_with_power
 from shaftwork.codegen.compiled_model import CompiledModel
-from shaftwork.codegen.model_observer import ModelObserver
-from shaftwork.codegen.waves import DenseWaves
+from shaftwork.codegen.model_observer import DenseWaves, ModelObserver
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.law_slopes import jumps, slope
 from shaftwork.core.errors import SimulationError

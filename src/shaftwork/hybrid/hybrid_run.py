@@ -18,8 +18,8 @@ import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.model_observer import Impact
-from shaftwork.codegen.times.timeline import Timeline
-from shaftwork.codegen.valueless import refuse_vanishing
+from shaftwork.codegen.timeline import Timeline
+from shaftwork.codegen.undefined_laws import refuse_vanishing
 from shaftwork.core.errors import AccuracyWarning, NetworkError, ParameterError, SimulationError
 from shaftwork.core.notices import warn
 from shaftwork.hybrid.commutation import takeovers

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array, Index
-from shaftwork.codegen.model_observer import Impact, ModelObserver
-from shaftwork.codegen.times.timeline import Timeline
-from shaftwork.codegen.waves import DenseWaves
+from shaftwork.codegen.model_observer import DenseWaves, Impact, ModelObserver
+from shaftwork.codegen.timeline import Timeline
 from shaftwork.components.base import Component
 from shaftwork.hybrid.hybrid_run import HybridRun, Span
 from shaftwork.hybrid.hybrid_state import Change, Regime

@@ -15,7 +15,7 @@ from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.code import Moves
 from shaftwork.codegen.state_transfer import StateTransfer
-from shaftwork.codegen.times.timeline import Timeline
+from shaftwork.codegen.timeline import Timeline
 from shaftwork.components.branches import INTEGRAL
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Leave, Mode

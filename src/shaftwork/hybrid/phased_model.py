@@ -13,8 +13,8 @@ import numpy as np
 from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.compiled_model import CompiledModel
-from shaftwork.codegen.starts.operating import another_start, energy_weights, lasting, steady_state
-from shaftwork.codegen.starts.start_values import initial_state
+from shaftwork.codegen.operating import another_start, energy_weights, lasting, steady_state
+from shaftwork.codegen.start_values import initial_state
 from shaftwork.core.errors import CompileError, NetworkWarning, SimulationError
 from shaftwork.core.notices import warn
 from shaftwork.core.parameters import in_si

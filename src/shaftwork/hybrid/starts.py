@@ -13,7 +13,7 @@ from sympy.core.relational import Relational
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.code import bindable, branchwise, scalar, vectorised_list
-from shaftwork.codegen.valueless import in_words
+from shaftwork.codegen.undefined_laws import in_words
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, readings_in
 from shaftwork.components.discontinuities import line
 from shaftwork.components.laws import t as TIME

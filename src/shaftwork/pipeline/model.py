@@ -13,9 +13,9 @@ import numpy as np
 from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.model_observer import ModelObserver
-from shaftwork.codegen.starts.operating import steady_state
-from shaftwork.codegen.starts.start_values import initial_state, with_others
-from shaftwork.codegen.valueless import refuse_vanishing
+from shaftwork.codegen.operating import steady_state
+from shaftwork.codegen.start_values import initial_state, with_others
+from shaftwork.codegen.undefined_laws import refuse_vanishing
 from shaftwork.core.calls import Callback
 from shaftwork.core.errors import Diagnostic, ParameterError
 from shaftwork.core.kept import Kept

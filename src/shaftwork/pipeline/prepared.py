@@ -14,10 +14,10 @@ from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.array_form.recovery import BranchHistory
 from shaftwork.codegen.compiled_model import CompiledModel
-from shaftwork.codegen.starts.start_values import initial_state
+from shaftwork.codegen.start_values import initial_state
 from shaftwork.codegen.state_transfer import StateTransfer
-from shaftwork.codegen.times.time_switches import Switching
-from shaftwork.codegen.valueless import rough, without_value
+from shaftwork.codegen.time_switches import Switching
+from shaftwork.codegen.undefined_laws import rough, without_value
 from shaftwork.core.errors import CompileError
 from shaftwork.core.kept import Kept
 from shaftwork.formulation.form import StateForm

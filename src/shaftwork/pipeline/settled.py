@@ -11,8 +11,8 @@ import numpy as np
 
 from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
-from shaftwork.codegen.times.time_switches import Switching
-from shaftwork.codegen.valueless import in_words
+from shaftwork.codegen.time_switches import Switching
+from shaftwork.codegen.undefined_laws import in_words
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.errors import NetworkWarning, SimulationError

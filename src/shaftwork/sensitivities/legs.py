@@ -11,7 +11,7 @@ import numpy as np
 from sympy import Expr
 
 from shaftwork.codegen.array_form.elements import Array
-from shaftwork.codegen.times.timeline import Timeline
+from shaftwork.codegen.timeline import Timeline
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.problem import Problem
 from shaftwork.numerics.zeros import LOOKS, zero

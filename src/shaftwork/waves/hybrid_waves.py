@@ -14,7 +14,6 @@ import numpy as np
 
 from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
-from shaftwork.codegen.waves import WaveSystem
 from shaftwork.hybrid.hybrid_state import Regime
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.integrate.problem import Problem, TimedProblem, Trajectory, changed
@@ -23,6 +22,7 @@ from shaftwork.waves.delay_engine.lines import Lines
 from shaftwork.waves.delay_engine.march import March, MarchEquations
 from shaftwork.waves.delay_engine.waveforms import Left
 from shaftwork.waves.wave_motion import CarriedWaves, WaveStart, checked_lines, delay_problem, lines_by_shaft
+from shaftwork.waves.wave_system import WaveSystem
 
 RATE = "rate of "
 

@@ -12,9 +12,8 @@ import numpy as np
 from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.array_form.recovery import BranchHistory
-from shaftwork.codegen.starts.start_values import Start, at_rest
+from shaftwork.codegen.start_values import Start, at_rest
 from shaftwork.codegen.state_transfer import StateTransfer
-from shaftwork.codegen.waves import WaveSystem
 from shaftwork.components.base import Component
 from shaftwork.components.shaft_models import Lumped, Wave
 from shaftwork.components.shafts import Shaft
@@ -29,6 +28,7 @@ from shaftwork.waves.delay_engine.collocation import POWERS
 from shaftwork.waves.delay_engine.engine import solve
 from shaftwork.waves.delay_engine.lines import DelayProblem, DelayTrajectory, Past, past_of
 from shaftwork.waves.delay_engine.waveforms import Polynomials
+from shaftwork.waves.wave_system import WaveSystem
 
 WHY = "Shafts are travelling waves, so states and delays are solved together."
 LIGHT = 0.1

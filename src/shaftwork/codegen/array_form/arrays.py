@@ -14,7 +14,6 @@ from shaftwork.codegen.array_form.elements import Array, GainMatrix, node_matrix
 from shaftwork.codegen.array_form.inputs import Inputs, where
 from shaftwork.codegen.array_form.loops import LoopSolver
 from shaftwork.codegen.array_form.matrices import LinearPart, MatrixAssembly
-from shaftwork.codegen.array_form.products import Factor, by_diagonals
 from shaftwork.codegen.code import vectorised
 from shaftwork.components.branches import ACROSS, INTEGRAL
 from shaftwork.components.laws import t as TIME
@@ -40,11 +39,6 @@ class ArrayProgram:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return ArrayProgram, (self.form,)  # compiled code cannot be stored
-
-    @property
-    def potentials(self) -> GainMatrix:
-        """(nodes, branches): the across variable of every node from those of the tree branches."""
-        return self.assembly.potentials
 
     @cached_property
     def shares(self) -> GainMatrix:
@@ -97,10 +91,22 @@ class BoundArrays:
         return y, inputs.values(t, y, x, self.p)
 
     def full(self) -> tuple[Array, Array, Array] | None:
-        """A, B and C in full where x' = A x + B u and y = C x; None where more enters."""
-        if self.loops is not None or self._has_slopes or self.part.D.nnz:
+        """A, B and C in full where x' = A x + B u and y = C x; None where more enters, or where they are large."""
+        A, B, _, C, D = self.part.factors
+        if self.loops is not None or self._has_slopes or not D.is_zero or A.full is None or B.full is None:
             return None
-        return self.part.A.toarray(), self.part.B.toarray(), self.part.C.toarray()
+        return None if C.full is None else (A.full, B.full, C.full)
+
+    @cached_property
+    def lines(self) -> tuple[Array, Array]:
+        """Impedances in N m s and delays in s (q / 2,) of lossless lines."""
+        graph, pairs = self.program.form.graph, []
+        for branch in self.program.form.waves[::2]:
+            template, places = graph.branches[branch].template, graph.part_of(branch).parameters
+            values = [float(self.p[places[symbol.name]]) for symbol in template.symbols]
+            pairs.append([vectorised(template.symbols, quantity)(*values) for quantity in template.line or ()])
+        impedances, delays = np.array(pairs, dtype=float).T
+        return impedances, delays
 
     def outputs(self, t: Any, x: Array) -> Array:
         """Outputs y alone; arguments as for `values`."""
@@ -124,11 +130,6 @@ class BoundArrays:
         return self.program.inputs.switches(t, y, x.T, self.p).T
 
     @cached_property
-    def _rows(self) -> Any:
-        """A, as it is multiplied by states."""
-        return self._A if isinstance(self._A, Factor) else by_diagonals(self._A)
-
-    @cached_property
     def _constant(self) -> Array | None:
         """What inputs that parameters alone tell add to x'; None where others enter."""
         if self.loops is not None or self._has_slopes or not self.program.inputs.constant:
@@ -138,14 +139,14 @@ class BoundArrays:
     def rhs(self, t: Any, x: Array) -> Array:
         """x' at time t, (n,); or (n, k) for states (n, k) at times (k,)."""
         if (constant := self._constant) is not None:
-            rate: Array = self._rows @ x
+            rate: Array = self._A @ x
             rate += constant if x.ndim == 1 else constant[:, None]
             return rate
         return self.rates(t, x, *self.values(t, x))
 
     def rates(self, t: Any, x: Array, y: Array, u: Array) -> Array:
         """x' from the states and the inputs that go with them."""
-        rate: Array = self._rows @ x[: self.program.inputs.states] + self._B @ u
+        rate: Array = self._A @ x[: self.program.inputs.states] + self._B @ u
         if self._has_slopes:
             rate = rate + self._B1 @ self.program.inputs.source_rates(t, y, x, self.p)
         return rate
@@ -158,7 +159,7 @@ class BoundArrays:
         return sparse.csc_array(A + B @ slope)
 
     def _with_slopes(self, t: float, x: Array) -> tuple[Any, Any, Any]:
-        """A, B and the slopes (m, n) of the inputs by the states: full arrays or of scipy.sparse."""
+        """A, B and the slopes (m, n) of the inputs by the states: of scipy.sparse, or full arrays in half the time."""
         inputs, part, controls = self.program.inputs, self.part, self._controls
         y, _ = self.values(t, x)
         A, B, _, C, _ = (factor.full for factor in part.factors)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -30,8 +31,13 @@ FARTHEST = 1e100
 numbers, as that of a shaft of 1e60 m, whose diameter counts to the fourth power."""
 ROUNDING = 1e-12
 """Part of the largest value up to which others are rounding, such as what an elimination leaves."""
+SAME = 1e-9
+"""Part of the largest by which values that are typed, or end an iteration, may differ and be the same."""
 AT_ONCE = 2_000_000
 """Numbers of many instants or columns that are made at once, 16 MB."""
+FULL = 16_000
+"""Entries up to which a matrix is an array: products of small sparse matrices cost a hundred times as much, and that of
+one with a state takes 2 us before it begins."""
 
 
 def blocks(count: int, width: int) -> Iterator[slice]:
@@ -180,6 +186,34 @@ class GainMatrix:
         if self._gains:
             data[self._variable] = fold(self._gains, self._values(p).__getitem__)
         return sparse.csr_array((data, (self._rows, self._columns)), shape=self._shape)
+
+
+class Factor:
+    """A matrix (n, m) that multiplies states or inputs again and again: as a full array where that is quicker.
+
+    BLAS fuses multiplication and addition, so that the difference of two equal terms is the rounding of one of them,
+    and no zero. Hence only who bears that takes full arrays, and what is read at many times stays sparse.
+
+    Args:
+        matrix: as an array or one of scipy.sparse.
+    """
+
+    def __init__(self, matrix: Any) -> None:
+        self.sparse = sparse.csr_array(matrix)
+        self.full: Array | None = self.sparse.toarray() if np.prod(self.sparse.shape) <= FULL else None
+        """The full array, where it is small enough."""
+        self.is_zero = not self.sparse.nnz
+        """Whether it has no entry."""
+
+    def __matmul__(self, other: Array) -> Array:
+        """Its product with (m,) or (m, k)."""
+        # zeros times an infinite torque would make all speeds NaN, and not those alone on which it acts
+        if self.full is None or other.ndim > 1 or not isfinite(other.dot(other)):
+            return np.asarray(self.sparse @ other)
+        return np.asarray(self.full.dot(other))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Factor, (self.sparse,)
 
 
 def link_matrix(form: StateForm, rows: Mapping[int, Row]) -> GainMatrix:

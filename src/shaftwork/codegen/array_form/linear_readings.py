@@ -11,10 +11,9 @@ import numpy as np
 from scipy import sparse
 
 from shaftwork.codegen.array_form.arrays import BoundArrays
-from shaftwork.codegen.array_form.elements import ROUNDING, Array, blocks
-from shaftwork.codegen.array_form.products import Factor
+from shaftwork.codegen.array_form.elements import ROUNDING, Array, Factor, blocks
 from shaftwork.codegen.array_form.recovery import BranchHistory, GivenHistory
-from shaftwork.codegen.times.sampling import GOLDEN
+from shaftwork.codegen.timeline import GOLDEN
 
 Read = Callable[[BranchHistory], Array]
 

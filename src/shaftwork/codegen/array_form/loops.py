@@ -20,17 +20,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from shaftwork.codegen.array_form.elements import Array, Index, blocks
+from shaftwork.codegen.array_form.elements import SAME, Array, Index, blocks
 from shaftwork.codegen.array_form.inputs import Inputs
 from shaftwork.codegen.array_form.matrices import LinearPart
 from shaftwork.core.errors import SimulationError
 
-ITERATIONS, HALVINGS = 50, 30
-ROUNDING = 1e-14
+ITERATIONS = 50
+"""Newton's steps, and halves of each."""
+ROUNDING = 64 * float(np.finfo(float).eps)
 NEARLY = 1e4 * ROUNDING
 """Residuals and steps up to which they are rounding where no step makes the residual smaller, as parts of the terms."""
-SAME = 1e-9
-"""Part of the largest unknowns by which two starts may differ and be the same."""
 
 
 class LoopSolver:
@@ -43,7 +42,8 @@ class LoopSolver:
         in_tree: which of them are in the tree, in the order of the rows of P and Q.
         p: parameter vector.
         beside_waves: the parts of the laws, where lines are at their nodes; there another solution is refused.
-        linear: whether all of them are laws of inertias, which are linear in the rates that they read.
+        linear: whether all of them are laws of inertias, linear in the rates that they read: solved at once for many
+            instants, in a third of the time of Newton's method.
     """
 
     def __init__(
@@ -139,7 +139,7 @@ class LoopSolver:
             step, solves = self._step(t[here], x[:, here], a[:, here], residual[:, here])
             near[:, here] = solves & (np.abs(step) <= NEARLY * np.abs(a[:, here]))
             norm = np.linalg.norm(residual, axis=0)
-            for _ in range(HALVINGS):
+            for _ in range(ITERATIONS):
                 trial = a[:, here] + step
                 left, terms = self.residual(t[here], x[:, here], trial)
                 better = np.linalg.norm(left, axis=0) < norm[here]

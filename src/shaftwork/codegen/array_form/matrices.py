@@ -22,22 +22,19 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from shaftwork.codegen.array_form.elements import (
+    FULL,
     Array,
     Coefficients,
+    Factor,
     GainMatrix,
     inverse_of_fractions,
     link_matrix,
     node_matrix,
 )
-from shaftwork.codegen.array_form.products import Factor
 from shaftwork.core.errors import CompileError
 from shaftwork.formulation.form import StateForm
+from shaftwork.formulation.value_diagnosis import is_singular
 from shaftwork.network.kinds import Kind
-
-SINGULAR = 1e-13
-"""Reciprocal condition below which a block of algebraic equations has no solution to speak of."""
-SMALL = 96
-"""Branches up to which the blocks are arrays: products of small sparse matrices cost a hundred times as much."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +186,7 @@ class MatrixAssembly:
             block = matrix[members][:, members].toarray()
             scale = 1 / np.sqrt(np.abs(np.diag(block)) + np.finfo(float).tiny)
             scaled = block * scale[:, None] * scale[None, :]
-            if not 1 / np.linalg.cond(scaled) > SINGULAR:
+            if is_singular(block):
                 raise self._singular(branches[members], what)
             inverse = np.linalg.inv(scaled) * scale[:, None] * scale[None, :]
             rows.append(np.repeat(members, len(members)))
@@ -223,7 +220,7 @@ class _MatrixBlocks:
         }
         self._groups = {name: np.array(members, dtype=np.intp) for name, members in groups.items()}
         self.rational = isinstance(loops, np.ndarray)
-        self._small = self.rational or loops.shape[0] <= SMALL
+        self._small = self.rational or np.prod(loops.shape) <= FULL
         self._number: type = object if self.rational else float
         self._loops = self.own(loops)
         self._cutsets = self._loops if cutsets is loops else self.own(cutsets)

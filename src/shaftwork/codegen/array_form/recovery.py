@@ -7,16 +7,15 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from sympy import Expr
+from sympy import Expr, Integer
 
 from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
-from shaftwork.codegen.valueless import without_value
+from shaftwork.codegen.undefined_laws import without_value
 from shaftwork.components.base import Profile, Signal
 from shaftwork.components.branches import INTEGRAL, RATE, End
 from shaftwork.components.law_slopes import slope
 from shaftwork.components.laws import t as TIME
-from shaftwork.formulation.form import StateForm
 from shaftwork.formulation.observables import Observable
 from shaftwork.network.graph import CircuitGraph, GraphPart
 from shaftwork.network.kinds import Kind
@@ -97,7 +96,9 @@ class BranchHistory:
     @cached_property
     def potentials(self) -> Array:
         """(nodes + 1, k) across variables of the nodes against the reference, which is the last row."""
-        nodes = self.bound.program.potentials(self.bound.p) @ np.where(self._is_tree[:, None], self.across, 0.0)
+        nodes = self.bound.program.assembly.potentials(self.bound.p) @ np.where(
+            self._is_tree[:, None], self.across, 0.0
+        )
         return np.vstack([nodes, np.zeros((1, len(self.t)))])
 
     @property
@@ -220,10 +221,18 @@ class BranchHistory:
         return next(k for k, template in stores if label in ("", template.label))
 
     def _through_port(self, part: GraphPart, port: str) -> Array:
-        return into(part, port, self.through, self.form, self.bound.p)
+        """(k,) what the node at a port gives to a part: the sum over the branches that begin or end there."""
+        factors = ((factor, k) for k in part.branches for factor in self._factors(part, k, port))
+        return np.asarray(sum((factor * self.through[k] for factor, k in factors), start=np.zeros(len(self.t))))
 
-    def _factors(self, part: GraphPart, index: int, port: str) -> Iterator[float]:
-        return _factors(part, self.form.graph.branches[index].template, port, self.bound.p)
+    def _factors(self, part: GraphPart, index: int, port: End) -> Iterator[float]:
+        """With which factors a branch takes its through variable from a port."""
+        template, p = self.form.graph.branches[index].template, self.bound.p
+        values = {s: float(p[part.parameters[s.name]]) for s in template.symbols} if template.balances else {}
+        for coefficient, *ends in template.balances or ((Integer(1), *template.ends),):
+            for sign, end in zip((1.0, -1.0), ends, strict=True):
+                if end == port:
+                    yield sign * float(coefficient.xreplace(values))
 
 
 class GivenHistory(BranchHistory):
@@ -251,35 +260,3 @@ def branches_with_power(graph: CircuitGraph, part: GraphPart) -> tuple[int, ...]
     """The branches of a part without those of its controller."""
     signals = part.component.signal_ports
     return tuple(k for k in part.branches if signals.isdisjoint(graph.branches[k].template.ends))
-
-
-def into(part: GraphPart, port: End, through: Array, form: StateForm, p: Array) -> Array:
-    """What the node at a port gives to a part: the sum over the branches that begin or end there.
-
-    Args:
-        part: the part.
-        port: one of its ports.
-        through: (branches, ...) what passes through each branch.
-        form: the equations.
-        p: (p,) their parameters.
-    """
-    total = np.zeros(through.shape[1:])
-    for index in part.branches:
-        template = form.graph.branches[index].template
-        for factor in _factors(part, template, port, p) if template.terms else _ends(template.ends, port):
-            total += factor * through[index]
-    return total
-
-
-def _factors(part: GraphPart, template: BranchTemplate, port: End, p: Array) -> Iterator[float]:
-    values = {s: float(p[part.parameters[s.name]]) for s in template.symbols}
-    for coefficient, plus, minus in template.balances:
-        for sign in _ends((plus, minus), port):
-            yield sign * float(coefficient.xreplace(values))
-
-
-def _ends(ends: tuple[str | None, str | None], port: End) -> Iterator[float]:
-    if ends[0] == port:
-        yield 1.0
-    if ends[1] == port:
-        yield -1.0

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 from weakref import ref
 
 import numpy as np
@@ -15,21 +15,30 @@ import sympy
 from numpy.typing import NDArray
 
 from shaftwork.codegen.array_form.elements import Array
+from shaftwork.codegen.compiled_model import SCALAR
 from shaftwork.codegen.taylor.heyoka_parameters import Fixed, HeldParameters
 from shaftwork.components.discontinuities import parts
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.calls import interruptible
 from shaftwork.core.errors import MissingExtraError
 
-# From about this number of states on, unrolled code takes seconds to compile and is hardly faster.
-LARGEST_UNROLLED = 100
-# e^-24 is 4e-11: what a series misses beyond is below the tolerance, and what follows it sees.
-NEAR = 24.0
-# What is fading counts so much at first, and between the square of this and 1 later.
-WEIGHT = 1e-3
 # For so long in s an event that has just been met is not met again.
 COOLDOWN = 1e-9
 
+
+class Fading(NamedTuple):
+    """How functions are followed that are constant to the last bit where e^-|u| is nothing beside 1.
+
+    Args:
+        near: |u| up to which their series show how they change: e^-24 is 4e-11, below the tolerance.
+        weight: so much u counts at first, and between the square of this and 1 later.
+    """
+
+    near: float = 24.0
+    weight: float = 1e-3
+
+
+FADING = Fading()
 
 # Functions with poles, or an end of what they are defined on.
 POLES = (sympy.tan, sympy.cot, sympy.sec, sympy.csc, sympy.coth, sympy.csch, sympy.log, sympy.asin, sympy.acos)
@@ -130,7 +139,7 @@ class HeyokaProgram:
         if self.fading:
             values = self._values("fading", self.fading, integrator.time, integrator.state, integrator.pars)
             with np.errstate(over="ignore"):
-                integrator.pars[self.weights] = WEIGHT / (values * values + NEAR**2)
+                integrator.pars[self.weights] = FADING.weight / (values * values + FADING.near**2)
 
     @contextmanager
     def lent(self, tolerance: float) -> Iterator[Compiled]:
@@ -168,16 +177,14 @@ class HeyokaProgram:
             options = {"compact_mode": True, "opt_level": 0}
             self._functions[name] = heyoka.cfunc(list(expressions), vars=list(self.variables), **options)
         compiled = self._functions[name]
-        values: Array = compiled(x, pars=parameters[: compiled.nparams], time=t)
-        return values
+        return np.asarray(compiled(x, pars=parameters[: compiled.nparams], time=t))
 
     def switch_signs(self, t: float, x: Array, parameters: Array, unchanged: Array | None = None) -> Array:
         """Signs of the switches (k,) at time t in s, state x (n,) and the parameters (p,) before the signs.
 
         Those of `unchanged` (k,) that are not zero are taken as they are.
         """
-        unchanged = np.zeros(len(self.switches)) if unchanged is None else unchanged
-        signs = unchanged
+        signs = unchanged = np.zeros(len(self.switches)) if unchanged is None else unchanged
         # A switch may depend on the sign of an earlier one: the maximum of three compares with the maximum of two.
         for left in reversed(range(len(self.switches))):
             values = self.switch_values(t, x, np.concatenate([parameters, signs]))
@@ -232,7 +239,7 @@ class HeyokaProgram:
             list(zip(self.variables, self.rows, strict=True)),
             [0.0] * len(self.rows),
             tol=tolerance,
-            compact_mode=len(self.rows) > LARGEST_UNROLLED,
+            compact_mode=len(self.rows) > SCALAR.states,
             **options,
         )
         return Compiled(integrator, listeners)
@@ -241,16 +248,16 @@ class HeyokaProgram:
         """The event that what is fading comes near."""
         import heyoka
 
-        return heyoka.t_event(heyoka.par[self.weights.start + number] * (value**2 - NEAR**2), callback=_go_on)
+        return heyoka.t_event(heyoka.par[self.weights.start + number] * (value**2 - FADING.near**2), callback=_go_on)
 
     def _outgrows(self, number: int, value: Any) -> Any:
         """The event that what is fading counts too much or too little."""
         import heyoka
 
-        size = heyoka.par[self.weights.start + number] * (value**2 + NEAR**2)
+        size = heyoka.par[self.weights.start + number] * (value**2 + FADING.near**2)
         callback = self._callback(HeyokaProgram.weigh)
         return heyoka.t_event(
-            (size - WEIGHT**2) * (1.0 - size), direction=heyoka.event_direction.negative, callback=callback
+            (size - FADING.weight**2) * (1.0 - size), direction=heyoka.event_direction.negative, callback=callback
         )
 
     def _end(self, number: int, guard: Any, listeners: list[Listener]) -> Any:
@@ -346,7 +353,6 @@ def build(
     translator = Translator(states, time, parameters, stepping, fixed)
     translated = tuple(translator.expression(row) for row in rows)
     watched = tuple(translator.expression(guard) for guard in guards)
-    moving = frozenset(states)
     return HeyokaProgram(
         translator.variables,
         translated,
@@ -359,7 +365,7 @@ def build(
         guards=watched,
         held=HeldParameters(translator.held, translator.variables, first) if stepping else None,
         stepping=np.array(translator.stepping, dtype=bool),
-        singular=any(_singular(node, moving, time) for row in rows for node in row.atoms(sympy.Pow, *POLES)),
+        singular=any(_singular(node, frozenset(states), time) for row in rows for node in row.atoms(sympy.Pow, *POLES)),
     )
 
 

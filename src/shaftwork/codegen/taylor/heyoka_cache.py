@@ -21,21 +21,18 @@ from shaftwork.core.files import replaced
 ROOM = 2**25
 """Bytes of compiled code that are kept, of the most recently used: opening it takes longer the more there is, 0.3 s of
 each process for 1 GiB, which is more than most networks take to compile."""
-USUAL_MEMORY, MEMORY = 2**31, 2**28
-"""Bytes of compiled code that heyoka keeps in memory for models made again, of its own accord and for us: a network has
-some 0.1 MB, and a process that makes tens of thousands of them must not grow by gigabytes."""
+MEMORY = 8 * ROOM
+"""Bytes of compiled code that heyoka keeps in memory for models made again, 2 GiB of its own accord: a network has some
+0.1 MB, and a process that makes tens of thousands of them must not grow by gigabytes."""
 KEPT, SUMS = "cache.db", "sums.json"
 """heyoka's file and ours."""
-PATIENCE = 2.0
-"""So long in s another process is waited for."""
 _COLUMNS = "hash, bitcode, comp_flag, env_fingerprint, opt_bc, opt_ir, obj"
 
 
 def keep_apart() -> None:
     """Keep compiled code in a folder of our own beside heyoka's, or nowhere where no folder can be made."""
     state = heyoka.llvm_state
-    if state.get_memcache_limit() == USUAL_MEMORY:
-        state.set_memcache_limit(MEMORY)
+    state.set_memcache_limit(min(MEMORY, state.get_memcache_limit()))
     path = state.get_diskcache_path()
     if path.name == "heyoka":  # nobody has said where
         folder = path.parent / "shaftwork"
@@ -96,7 +93,7 @@ def _put_down_sums(folder: Path) -> None:
 
 
 def _opened(place: Path) -> sqlite3.Connection:
-    return sqlite3.connect(f"{place.as_uri()}?mode=rw", timeout=PATIENCE, uri=True)
+    return sqlite3.connect(f"{place.as_uri()}?mode=rw", uri=True)
 
 
 def _known(folder: Path) -> dict[int, int]:

@@ -234,14 +234,6 @@ class Translator:
             result = heyoka.select(self.expression(pair.cond), self.expression(pair.expr), result)
         return result
 
-    def choice(self, node: ITE) -> Any:
-        """One of two values by the sign of a switch."""
-        return heyoka.select(*self.arguments(node))
-
-    def negation(self, node: Not) -> Any:
-        """The opposite of a condition."""
-        return heyoka.eq(self.expression(node.args[0]), heyoka.expression(0.0))
-
     def interpolation(self, node: Interpolation) -> Any:
         """Straight lines between the points of a table, constant beyond its ends."""
         position = self.expression(node.args[0])
@@ -305,12 +297,12 @@ SHAPES: dict[Any, Callable[[Translator, Any], Any]] = {
     sympy.Max: Translator.extreme,
     sympy.Min: Translator.extreme,
     sympy.Piecewise: Translator.piecewise,
-    ITE: Translator.choice,
+    ITE: lambda translator, node: heyoka.select(*translator.arguments(node)),
     sympy.floor: Translator.constant,
     HeldNoise: Translator.constant,
     Interpolation: Translator.interpolation,
     InterpolationSlope: Translator.interpolation_slope,
-    Not: Translator.negation,
+    Not: lambda translator, node: heyoka.eq(*translator.arguments(node), heyoka.expression(0.0)),
     And: lambda translator, node: heyoka.logical_and(translator.arguments(node)),
     Or: lambda translator, node: heyoka.logical_or(translator.arguments(node)),
     Xor: lambda translator, node: reduce(heyoka.neq, translator.arguments(node)),

@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array
-from shaftwork.codegen.mobility import Mobility, complementary
+from shaftwork.codegen.state_transfer import Mobility, complementary
 from shaftwork.components.branches import ACROSS
 from shaftwork.components.modes import Leave
 from shaftwork.core.errors import SimulationError

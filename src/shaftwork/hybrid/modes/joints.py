@@ -27,9 +27,8 @@ from scipy.sparse.linalg import splu
 from sympy import Add, Expr, Symbol
 
 from shaftwork.codegen.array_form.arrays import ArrayProgram, BoundArrays
-from shaftwork.codegen.array_form.elements import ROUNDING, Array
+from shaftwork.codegen.array_form.elements import ROUNDING, Array, Factor
 from shaftwork.codegen.array_form.matrices import LinearPart
-from shaftwork.codegen.array_form.products import Factor
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.formulation.explicit_rows import Rows
 from shaftwork.formulation.form import StateForm

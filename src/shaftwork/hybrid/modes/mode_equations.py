@@ -16,12 +16,11 @@ from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.array_form.linear_readings import ReadingMatrices
 from shaftwork.codegen.array_form.matrices import LinearPart
-from shaftwork.codegen.array_form.products import ManyExpressions
 from shaftwork.codegen.array_form.recovery import BranchHistory
-from shaftwork.codegen.code import Moves, around, bindable, is_rough, vectorised
+from shaftwork.codegen.code import Moves, around, bindable, is_rough, vectorised, vectorised_list
 from shaftwork.codegen.compiled_model import ScalarProgram
 from shaftwork.codegen.state_transfer import StateTransfer
-from shaftwork.codegen.valueless import first_missing, in_words, rough, without_value
+from shaftwork.codegen.undefined_laws import first_missing, in_words, rough, without_value
 from shaftwork.components.discontinuities import pieces_degree
 from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME
@@ -159,12 +158,20 @@ class ModeEquations:
         return self._guards_by_p(p.tobytes(), lambda: self._guards(p))
 
     def _guards(self, p: Array) -> GuardValues:
-        expressions, read = self._many.bind(self.values(p)), self._read(p)
-        return lambda times, states: expressions(times, read(times, states))
+        read, parameters = self._read(p), self.values(p).tolist()
+
+        def guards(times: Array, states: Array) -> Array:
+            values = np.empty((len(self._expressions), len(times)))
+            with np.errstate(all="ignore"):
+                for row, value in enumerate(self._many(times, *read(times, states), *parameters)):
+                    values[row] = value
+            return values.T
+
+        return guards
 
     @cached_property
-    def _many(self) -> ManyExpressions:
-        return ManyExpressions(self._expressions, self._readings.symbols, self._parameters, sums=self._rows is None)
+    def _many(self) -> Callable[..., Any]:
+        return vectorised_list((TIME, *self._readings.symbols, *self._parameters), self._expressions)
 
     def _read(self, p: Array) -> Callable[[Array, Array], Array]:
         """What guards are made of at times (k,) and states (k, n): the states, or quantities that follow from them."""

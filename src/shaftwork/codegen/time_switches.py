@@ -13,8 +13,18 @@ from sympy import Expr, Min, Symbol, pi, sin
 
 from shaftwork.codegen.array_form.elements import Array, Index
 from shaftwork.codegen.code import scalar, vectorised
-from shaftwork.codegen.times.sampling import MOST_SAMPLES, RESOLVED, Sides, bumps, changes_of, nearest, sampled
-from shaftwork.codegen.times.timeline import NOTHING, Timeline, timeline
+from shaftwork.codegen.timeline import (
+    CLEARANCE,
+    NOTHING,
+    SEARCH,
+    Sides,
+    Timeline,
+    bumps,
+    changes_of,
+    nearest,
+    sampled,
+    timeline,
+)
 from shaftwork.components.discontinuities import line, narrow_places, switches, unsolved_places
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ParameterError
@@ -23,14 +33,10 @@ from shaftwork.formulation.form import StateForm
 from shaftwork.network.graph import GraphPart
 from shaftwork.network.kinds import Kind
 
-# Rounding of a linear argument, in units of its terms.
-ROUNDINGS = 8
 DECADES = np.array([sign * 10.0**-place for place in range(1, 13) for sign in (-1, 1)])
 """Distances from a pulse that goes on far away, as parts of the run: no step gets from one to the next unawares."""
 MOST_PULSES = 10_000
 """Pulses of a law at which engines end a step: each takes 0.1 ms, so more would take longer than the run."""
-KEPT = 8
-"""Timelines of other runs that are kept."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +80,7 @@ class _Switch:
             return []
         with np.errstate(all="ignore"):
             times = (levels - offset) / slope + 0.0
-            reach = ROUNDINGS * np.finfo(float).eps * (np.abs(levels) + abs(offset)) / abs(slope)
+            reach = CLEARANCE * np.finfo(float).eps * (np.abs(levels) + abs(offset)) / abs(slope)
         return [(time, far) for time, far in zip(times.tolist(), reach.tolist(), strict=True) if math.isfinite(time)]
 
     def changes(self, p: Array, t0: float, t_end: float) -> list[tuple[float, float]] | None:
@@ -85,7 +91,7 @@ class _Switch:
             return self.on_a_line(self.levels, p)
         slope, offset = self.straight(p)
         low, high = sorted((slope * t0 + offset, slope * t_end + offset))
-        if not high - low < MOST_SAMPLES // RESOLVED:
+        if not high - low < SEARCH.most // SEARCH.resolved:
             return None
         return self.on_a_line(np.arange(math.floor(low), math.ceil(high) + 1, dtype=float), p)
 
@@ -137,7 +143,7 @@ class Switching:
         self._unsolved = tuple(_unsolved(form))
         every = (*self._switches, *self._narrow, *self._unsolved)
         self._places = sorted({place for one in every for place in one.places})
-        self._timelines = Kept[tuple[bytes, float, float, bool], Timeline](KEPT)
+        self._timelines = Kept[tuple[bytes, float, float, bool], Timeline](8)
 
     def known(self, p: Array) -> tuple[float, ...]:
         """Times in s of switches that are linear in time, increasing: they are known without a run.
@@ -286,6 +292,6 @@ def _whole_line(argument: Expr) -> tuple[Expr, Expr] | None:
 def _too_often(switch: _Switch, t0: float, t_end: float) -> ParameterError:
     return ParameterError(
         f"'{switch.part}': a law that changes with the sign of {switch.argument} switches too often between "
-        f"t = {t0:g} s and {t_end:g} s to be followed: more than {MOST_SAMPLES // RESOLVED} times, or without end. "
-        "Take a shorter run, or a smooth law."
+        f"t = {t0:g} s and {t_end:g} s to be followed: more than {SEARCH.most // SEARCH.resolved} times, or without "
+        "end. Take a shorter run, or a smooth law."
     )

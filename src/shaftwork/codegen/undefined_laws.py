@@ -19,12 +19,10 @@ from shaftwork.formulation.form import StateForm
 from shaftwork.network.graph import GraphPart
 from shaftwork.network.templates import substitution
 from shaftwork.network.wording import title
-from shaftwork.numerics.zeros import zero
+from shaftwork.numerics.zeros import LOOKS, zero
 
 LONGEST = 60
 """Characters of a law in a message."""
-SAMPLES = 16
-"""Times in a step of a motion at which an inertia is looked at."""
 WIDEST = 1 / np.finfo(float).eps
 """Largest ratio of an inertia along a motion: beyond it the smallest is lost in the rounding of the largest."""
 
@@ -94,7 +92,7 @@ def _with_lowest(course: Callable[[Array], Array], steps: Array) -> Array:
     """Times in every step, and those between them at which an inertia is lowest and may reach zero."""
     if steps.size < 2:
         return steps
-    parts = np.linspace(0, 1, SAMPLES, endpoint=False)
+    parts = np.append(0.0, LOOKS)
     times = np.append((steps[:-1, None] + np.diff(steps)[:, None] * parts).ravel(), steps[-1])
     values = course(times)
     before, here, after = values[:-2], values[1:-1], values[2:]

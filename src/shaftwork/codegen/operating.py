@@ -3,53 +3,56 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import MatrixRankWarning, lsqr, splu
 
 from shaftwork.codegen.array_form.arrays import BoundArrays
-from shaftwork.codegen.array_form.elements import Array
-from shaftwork.codegen.starts.wound_shafts import inner_nodes, node_of, speed_at
+from shaftwork.codegen.array_form.elements import ROUNDING, Array
+from shaftwork.codegen.start_names import inner_nodes, node_of, speed_at
 from shaftwork.core.errors import SimulationError
 from shaftwork.core.notices import hint
 from shaftwork.formulation.form import StateForm
 
-ROUNDING, TINY = float(np.finfo(float).eps), float(np.finfo(float).tiny)
-SMALLEST_STEP = 1e-6
-"""First step of the way to a steady state, s."""
-JUMP = 1e-12
-"""A law jumps where so short a step, s, still leaves a defect: the flank of a damped gap, which the drive runs onto."""
-SHORTEST = 1e-200
-"""No step, s, is shorter: a law that is nowhere finite on the way leaves none."""
-DEFECT = 0.3
-"""A step on that way is taken when its equation is left with less than this fraction of the rates."""
-SLOW = 1e-12
-"""What changes with less than this fraction of the fastest rate stays; rounding is four digits below."""
-NEARBY = (1e-9, 1e-7)
-"""So far on the way, in s, a law is asked for its slope where it has none."""
-STANDSTILL = 1e-6
-"""A steady state has been reached when the last step changed the states by no more than this fraction."""
+EPS, TINY = float(np.finfo(float).eps), float(np.finfo(float).tiny)
+AT_ONCE = 1e-12
+"""A time, s, that is none beside any motion."""
 
 
-def steady_state(
-    bound: BoundArrays,
-    start: Array,
-    t: float,
-    *,
-    tolerance: float = 1e-12,
-    limit: int = 2000,
-    ends: Callable[[Array], bool] | None = None,
-) -> Array:
+class Way(NamedTuple):
+    """The way to a steady state.
+
+    Args:
+        first: its first step, s.
+        defect: a step is taken when its equation is left with less than this fraction of the rates.
+        nearby: so far ahead, s, a law is asked for its slope where it has none.
+        standstill: it ends when the last step changed the states by no more than this fraction.
+        steps: at most so many are tried.
+    """
+
+    first: float = 1e-6
+    defect: float = 0.3
+    nearby: tuple[float, ...] = (1e-9, 1e-7)
+    standstill: float = 1e-6
+    steps: int = 2000
+
+
+WAY = Way()
+
+
+def steady_state(bound: BoundArrays, start: Array, t: float, *, ends: Callable[[Array], bool] | None = None) -> Array:
     """States at which nothing changes, reached from a start the way the drive itself would reach it.
 
     Where `ends` says of states that other equations hold there, the way ends just beyond.
 
     Law: implicit Euler steps (I/h - J) dx = rhs, each with one iteration of Newton's method. A step is taken where its
     defect is small, and the next is then longer: first the motion of the drive is followed, so that of several steady
-    states the one it runs to is found, and in the end the steps are those of Newton's method. A jump of a law is passed
-    in a step that is next to nothing. No state is known better than to rounding of the whole stored energy: a drive
-    that stands under load has the speeds that its torques leave.
+    states the one it runs to is found, and in the end the steps are those of Newton's method. A jump of a law, such as
+    the flank of a damped gap which the drive runs onto, is passed in a step that is next to nothing. No state is known
+    better than to rounding of the whole stored energy: a drive that stands under load has the speeds that its torques
+    leave.
 
     Raises:
         SimulationError: the rates do not vanish; the message names the state that keeps changing.
@@ -66,26 +69,26 @@ def steady_state(
 
     x = np.array(start, dtype=float)
     rate, step = counts * bound.rhs(t, x), np.zeros_like(x)
-    h = SMALLEST_STEP
-    for _ in range(limit):
+    h = WAY.first
+    for _ in range(WAY.steps):
         slopes = counted @ _slopes(bound, t, x, rate)
-        vanishing = tolerance * _rate_sizes(bound, t, x, slopes, length(x) / weights * (ROUNDING / tolerance))
-        settled = np.linalg.norm(step) <= STANDSTILL * np.linalg.norm(x)  # a drive that runs away is not steady
+        vanishing = ROUNDING * _rate_sizes(bound, t, x, slopes, length(x) / weights * (EPS / ROUNDING))
+        settled = np.linalg.norm(step) <= WAY.standstill * np.linalg.norm(x)  # a drive that runs away is not steady
         if settled and (np.abs(rate) <= vanishing).all():
             return x
         trial = _solve(sparse.csc_array(identity / h - slopes), rate)
         new = counts * bound.rhs(t, x + trial)
         defect = length(trial / h - new) / max(length(rate), length(vanishing), TINY)
         over = ends is not None and ends(x + trial)
-        is_right = defect < DEFECT or (h < JUMP and np.isfinite(defect))
-        if not is_right or (over and h > SMALLEST_STEP):
+        is_right = defect < WAY.defect or (h < AT_ONCE and np.isfinite(defect))
+        if not is_right or (over and h > WAY.first):
             h = h / 4
-            if h < SHORTEST:
+            if h < TINY:  # a law that is nowhere finite on the way leaves none
                 break
             continue
         if over and ends is not None:
             return _just_beyond(x, trial, ends)
-        x, rate, step, h = x + trial, new, trial, min(h * (2.0 if defect > DEFECT / 10 else 8.0), 1e12)
+        x, rate, step, h = x + trial, new, trial, min(h * (2.0 if defect > WAY.defect / 10 else 8.0), 1e12)
     raise _still_changing(form, x, rate, int(np.argmax(np.abs(weights * rate))))
 
 
@@ -126,7 +129,7 @@ def another_start(form: StateForm) -> str:
 
 def _slopes(bound: BoundArrays, t: float, x: Array, rate: Array) -> sparse.csc_array:
     """The Jacobian; where a law has no finite slope, as |omega|^0.5 at rest, that a little farther on the way."""
-    for step in (0.0, *NEARBY):
+    for step in (0.0, *WAY.nearby):
         jacobian = sparse.csc_array(bound.jacobian(t, x + step * rate))
         if np.isfinite(jacobian.data).all():
             return jacobian
@@ -161,7 +164,7 @@ def lasting(bound: BoundArrays, x: Array, disturbed: Array, t: float) -> Array:
     """(n,) what a disturbance (n,) of a steady state (n,) leaves for ever: one long step of implicit Euler."""
     weights = energy_weights(bound)
     scaled = sparse.diags_array(weights) @ bound.jacobian(t, x) @ sparse.diags_array(1 / weights)
-    slow = SLOW * (float(abs(scaled).max()) if scaled.nnz else 0.0)
+    slow = ROUNDING * (float(abs(scaled).max()) if scaled.nnz else 0.0)
     if not slow:
         return disturbed
     identity = sparse.eye_array(len(x), format="csc")

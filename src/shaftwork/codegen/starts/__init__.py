@@ -1,1 +1,0 @@
-"""Start states, and the states of steady operation."""

@@ -1,1 +1,0 @@
-"""The instants at which laws switch because of the time alone."""
