@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from shaftwork.components.rotation import Damper, Inertia, Spring
+from shaftwork.components.mechanics import Damper, Inertia, Spring
 from shaftwork.latex.printing import Line
 from shaftwork.latex.series import shortened
 from shaftwork.latex.spelling import INDEX_CLOSES, INDEX_OPENS

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shaftwork.components.rotation import Inertia, Spring
+from shaftwork.components.mechanics import Inertia, Spring
 from shaftwork.latex.spelling import ACCENTED, chosen_subscript, escaped, in_text
 from shaftwork.network.builder import NetworkBuilder
 from tests.equations.networks import equations_of

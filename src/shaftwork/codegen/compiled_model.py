@@ -20,8 +20,8 @@ from shaftwork.codegen.code import branchwise, scalar
 from shaftwork.codegen.runs import MachineCode, RunProgram
 from shaftwork.components.discontinuities import pieces_degree
 from shaftwork.components.laws import t as TIME
+from shaftwork.core.calls import Kept
 from shaftwork.core.errors import CompileError, MissingExtraError, ParameterError
-from shaftwork.core.kept import Kept
 from shaftwork.core.parameters import in_si, is_quantity, without_unit
 from shaftwork.formulation.explicit_rows import BlockTooLargeError, Rows, explicit_rows
 from shaftwork.formulation.form import StateForm

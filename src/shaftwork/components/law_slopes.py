@@ -50,7 +50,7 @@ from sympy.core.relational import Relational
 from sympy.polys.polyerrors import BasePolynomialError
 from sympy.simplify.fu import TR8
 
-from shaftwork.components.clips import replaced
+from shaftwork.components.laws import replaced
 from shaftwork.components.tables import InterpolationSlope
 
 STEPS = (sign, Heaviside, Relational, InterpolationSlope, floor, ceiling)

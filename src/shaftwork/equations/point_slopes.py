@@ -16,8 +16,7 @@ from shaftwork.core.errors import ParameterError, no_quantity
 from shaftwork.equations.quantities import Quantities, is_rate
 from shaftwork.equations.rows import NetworkEquations
 from shaftwork.formulation.form import Names
-from shaftwork.network.controlled import readings_of
-from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch
+from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, readings_of
 from shaftwork.network.kinds import Kind
 
 VARIED = Symbol("varied", real=True)

@@ -21,8 +21,7 @@ from shaftwork.equations.assembly import Assembly
 from shaftwork.equations.point_slopes import LawSlopes
 from shaftwork.formulation.form import StateForm
 from shaftwork.formulation.source_inputs import Place
-from shaftwork.network.controlled import Reading, readings_of
-from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
+from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart, Reading, readings_of
 from shaftwork.network.kinds import Kind
 
 S = Symbol("s")

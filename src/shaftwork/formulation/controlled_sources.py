@@ -11,10 +11,9 @@ from collections.abc import Iterable, Iterator
 from shaftwork.components.branches import ACROSS
 from shaftwork.core.errors import Diagnostic
 from shaftwork.formulation.view import View, Words, words_of
-from shaftwork.network.controlled import Reading, readings_of
-from shaftwork.network.graph import GROUND
+from shaftwork.network.graph import GROUND, Reading, readings_of
 from shaftwork.network.kinds import Kind
-from shaftwork.network.wording import at_nodes, title
+from shaftwork.network.netlist import at_nodes, title
 
 
 def reads_itself(view: View, law: int) -> bool:

@@ -10,7 +10,7 @@ from shaftwork.core.domains import Domain
 from shaftwork.formulation.form import StateForm
 from shaftwork.network.graph import GROUND, ends_of
 from shaftwork.network.kinds import Kind
-from shaftwork.network.wording import Spelling, title
+from shaftwork.network.netlist import Spelling, title
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from shaftwork.frequency.linearization import Linearization
 from shaftwork.frequency.natural_modes import Modes
 from shaftwork.frequency.point_speeds import as_multiple, speeds_to_give, warn_of_speeds_left, warn_of_turning_angles
 from shaftwork.network.kinds import Kind
-from shaftwork.network.wording import listed
+from shaftwork.network.netlist import listed
 from shaftwork.pipeline.arguments import as_names
 from shaftwork.pipeline.settled import SteadyState
 from shaftwork.results.solution import Solution

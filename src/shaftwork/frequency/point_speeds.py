@@ -22,10 +22,9 @@ from shaftwork.formulation.form import StateForm
 from shaftwork.formulation.gains import value_of
 from shaftwork.formulation.tree import column_of
 from shaftwork.formulation.value_diagnosis import speeds_along
-from shaftwork.network.controlled import Reading, readings_of
-from shaftwork.network.graph import CircuitGraph
+from shaftwork.network.graph import CircuitGraph, Reading, readings_of
 from shaftwork.network.kinds import Kind
-from shaftwork.network.wording import listed
+from shaftwork.network.netlist import listed
 
 SAME = 1e-9
 """Ratios that differ by less are equal, and a speed below this part of the largest is none."""

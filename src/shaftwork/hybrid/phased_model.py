@@ -40,7 +40,7 @@ from shaftwork.hybrid.hybrid_state import HybridState
 from shaftwork.hybrid.modes.exceeded_guards import passes_limit
 from shaftwork.hybrid.named_phases import known_modes, modes_in, whole_name, words_of
 from shaftwork.hybrid.phases import Phases
-from shaftwork.network.wording import listed
+from shaftwork.network.netlist import listed
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.settled import SteadyState, refuse_moving, warn_of_earlier_levels

@@ -9,8 +9,8 @@ import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.components.modes import ModeChoice
+from shaftwork.core.calls import Kept
 from shaftwork.core.errors import NetworkError, NetworkWarning, ParameterError
-from shaftwork.core.kept import Kept
 from shaftwork.core.notices import muted
 from shaftwork.formulation.value_diagnosis import self_locks
 from shaftwork.hybrid.modes.mode_equations import ModeEquations

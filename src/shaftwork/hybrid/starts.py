@@ -18,8 +18,8 @@ from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, readings_in
 from shaftwork.components.discontinuities import line
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import ANEW, Modes
+from shaftwork.core.calls import Kept
 from shaftwork.core.errors import AccuracyWarning, ParameterError, no_value
-from shaftwork.core.kept import Kept
 from shaftwork.core.notices import warn
 from shaftwork.formulation.observables import Observables
 from shaftwork.hybrid.modes.mode_machines import ModeMachine, ModeNames

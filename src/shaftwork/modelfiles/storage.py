@@ -16,10 +16,9 @@ from shaftwork.core.files import replaced
 from shaftwork.modelfiles import textfile
 from shaftwork.modelfiles.textfile import ModelText, PartText
 from shaftwork.network import expressions
-from shaftwork.network.expression_reader import parse
+from shaftwork.network.expressions import parse
 from shaftwork.network.grammar import fault_of, words_of
-from shaftwork.network.netlist import Netlist, Origin, Placed
-from shaftwork.network.wording import title
+from shaftwork.network.netlist import Netlist, Origin, Placed, title
 
 MAXIMUM_LAW_WORDS = 4000
 """Numbers, names and signs of all laws of a file together, some 400 laws: more take too long to read."""

@@ -29,8 +29,7 @@ from typing import Any
 
 from shaftwork.components.tables import Table
 from shaftwork.core.errors import ModelFileError, ParameterError
-from shaftwork.network.netlist import IMPACTS, Impacts
-from shaftwork.network.wording import MAXIMUM_NAME, is_name
+from shaftwork.network.netlist import IMPACTS, MAXIMUM_NAME, Impacts, is_name
 
 FORMAT = 1
 """Version of the format; a reader refuses any other."""

@@ -22,9 +22,18 @@ from shaftwork.core.errors import Diagnostic, ShaftworkError
 from shaftwork.network.graph import GROUND, CircuitGraph, resolve, signals_of
 from shaftwork.network.kinds import Kind
 from shaftwork.network.law_faults import Fault, instead_of, law_faults
-from shaftwork.network.netlist import REFERENCE, Netlist, Placed
+from shaftwork.network.netlist import (
+    MAXIMUM_NAME,
+    REFERENCE,
+    Netlist,
+    Placed,
+    Spelling,
+    at_nodes,
+    is_name,
+    listed,
+    title,
+)
 from shaftwork.network.sharing import Shared
-from shaftwork.network.wording import MAXIMUM_NAME, Spelling, at_nodes, is_name, listed, title
 
 LEFT_OUT = ("node name", "node count", "wrong domain", "no effect", "component")
 """Kinds of problems whose part is left out of what is examined further."""

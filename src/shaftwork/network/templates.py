@@ -40,8 +40,7 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import ModeChoice, Modes, has_mode, mode_symbol
 from shaftwork.core.domains import DOMAINS
 from shaftwork.core.errors import ShaftworkError
-from shaftwork.network.changing_stores import CHANGE, beyond_constant, changes, spring
-from shaftwork.network.kinds import Kind, Resolved, law_of, resolved
+from shaftwork.network.kinds import CHANGE, Kind, Resolved, beyond_constant, changes, law_of, resolved, spring
 
 T = TypeVar("T")
 

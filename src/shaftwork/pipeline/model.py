@@ -16,9 +16,8 @@ from shaftwork.codegen.model_observer import ModelObserver
 from shaftwork.codegen.starts.operating import steady_state
 from shaftwork.codegen.starts.start_values import initial_state, with_others
 from shaftwork.codegen.valueless import refuse_vanishing
-from shaftwork.core.calls import Callback
+from shaftwork.core.calls import Callback, Kept
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.kept import Kept
 from shaftwork.core.notices import PulsationWarning, muted
 from shaftwork.core.parameters import in_si
 from shaftwork.core.screen import counted, named, on_one_screen

@@ -17,7 +17,7 @@ from shaftwork.core.notices import warn
 from shaftwork.core.parameters import in_si
 from shaftwork.network.checks import resting_trains
 from shaftwork.network.graph import CircuitGraph
-from shaftwork.network.wording import first_few, listed
+from shaftwork.network.netlist import first_few, listed
 from shaftwork.pipeline.prepared import EngineModel, Prepared
 from shaftwork.results.solution import Solution
 

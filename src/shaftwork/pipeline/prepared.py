@@ -17,8 +17,8 @@ from shaftwork.codegen.array_form.recovery import BranchHistory
 from shaftwork.codegen.compiled_model import CompiledModel
 from shaftwork.codegen.times.time_switches import Switching
 from shaftwork.codegen.valueless import rough, without_value
+from shaftwork.core.calls import Kept
 from shaftwork.core.errors import CompileError
-from shaftwork.core.kept import Kept
 from shaftwork.formulation.form import StateForm
 from shaftwork.integrate.engines import available
 from shaftwork.integrate.problem import Fractions, LinearInputs, Observed, Problem

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 
-from shaftwork.components.rotation import LossyGear
+from shaftwork.components.mechanics import LossyGear
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import Diagnostic, NetworkError, ParameterError, SignalError
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart

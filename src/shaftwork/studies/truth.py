@@ -16,7 +16,7 @@ from shaftwork.components.base import Component
 from shaftwork.components.discontinuities import breakpoints
 from shaftwork.components.laws import NUMERICAL, as_expression
 from shaftwork.components.laws import t as TIME
-from shaftwork.components.rotation import Damper, Inertia
+from shaftwork.components.mechanics import Damper, Inertia
 from shaftwork.components.shaft_models import OneSpring, Rigid, ShaftModel, Spectral, Wave
 from shaftwork.components.shafts import Shaft
 from shaftwork.components.sources import TorqueSource

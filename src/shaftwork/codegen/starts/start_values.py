@@ -18,7 +18,7 @@ from shaftwork.codegen.starts.operating import energy_weights
 from shaftwork.codegen.starts.start_names import StartNames
 from shaftwork.codegen.starts.wound_shafts import speeds_inside
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.times import just_after
+from shaftwork.numerics.zeros import just_after
 
 CONSISTENT = 1e-9
 """Two given values contradict each other when they differ by more than this fraction."""

@@ -17,8 +17,8 @@ from shaftwork.codegen.times.sampling import MOST_SAMPLES, RESOLVED, Sides, bump
 from shaftwork.codegen.times.timeline import NOTHING, Timeline, timeline
 from shaftwork.components.discontinuities import line, narrow_places, switches, unsolved_places
 from shaftwork.components.laws import t as TIME
+from shaftwork.core.calls import Kept
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.kept import Kept
 from shaftwork.formulation.form import StateForm
 from shaftwork.network.graph import GraphPart
 from shaftwork.network.kinds import Kind

@@ -16,8 +16,8 @@ from shaftwork.codegen.starts.start_values import initial_state
 from shaftwork.components.modes import ModeChoice
 from shaftwork.components.shaft_models import MOST_SPECTRAL, OneSpring, Rigid, Spectral, Wave
 from shaftwork.components.shafts import Shaft
+from shaftwork.core.calls import Kept
 from shaftwork.core.errors import AccuracyWarning, NetworkWarning, ParameterError
-from shaftwork.core.kept import Kept
 from shaftwork.core.notices import muted
 from shaftwork.frequency.analysis import (
     Names,

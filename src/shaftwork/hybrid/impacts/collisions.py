@@ -28,8 +28,8 @@ import numpy as np
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.mobility import Mobility, complementary
 from shaftwork.components.modes import Leave
+from shaftwork.core.calls import Kept
 from shaftwork.core.errors import SimulationError
-from shaftwork.core.kept import Kept
 from shaftwork.hybrid.hybrid_state import HybridState, Regime
 from shaftwork.hybrid.impacts.impact_contacts import Contact, in_turn, lasting, nodes, opens_at, touching
 from shaftwork.hybrid.impacts.impulses import Blow, ImpactStage, ImpactStart, Impulses, summed

@@ -25,8 +25,8 @@ from shaftwork.codegen.valueless import first_missing, in_words, rough, without_
 from shaftwork.components.discontinuities import pieces_degree
 from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME
+from shaftwork.core.calls import Kept
 from shaftwork.core.errors import CompileError, SimulationError, no_value
-from shaftwork.core.kept import Kept
 from shaftwork.formulation.explicit_rows import Rows
 from shaftwork.formulation.form import Names
 from shaftwork.formulation.observables import NamedReadings, Observables

@@ -25,7 +25,7 @@ from shaftwork.codegen.array_form.products import Factor
 from shaftwork.codegen.compiled_model import ScalarProgram
 from shaftwork.components.discontinuities import parts
 from shaftwork.components.noise import HeldNoise, SmoothNoise
-from shaftwork.core.kept import Kept
+from shaftwork.core.calls import Kept
 from shaftwork.formulation.form import StateForm
 from shaftwork.hybrid.modes.held_rows import HeldRows, groups, held_places
 from shaftwork.hybrid.modes.joints import HeldArrays, HeldStores, Joints
