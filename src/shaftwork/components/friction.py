@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, ClassVar
@@ -17,8 +18,8 @@ from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter
 
 SLIPPING, STUCK, HELD = "", "stuck", "held by others"
-# What holds gives way this much above its limit: then there is a torque that moves it, and no rounding of one.
-GIVES_WAY = 1 + 2e-14
+# What holds gives way a hundred roundings above its limit: then there is a torque that moves it.
+GIVES_WAY = 1 + 100 * sys.float_info.epsilon
 
 
 def rubbing(

@@ -60,20 +60,23 @@ def chain(m: int, *, half_ends: bool) -> Mesh:
     )
 
 
-# Interior stencils as (offset, factor), and the first rows and norm of the boundary closure, times the interval.
-_SECOND = (((-1, -1 / 2), (1, 1 / 2)), (1 / 2,), ((-1 / 2, 1 / 2),))
-_FOURTH = (
-    ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12)),
-    (17 / 48, 59 / 48, 43 / 48, 49 / 48),
-    (
-        (-1 / 2, 59 / 96, -1 / 12, -1 / 32),
-        (-59 / 96, 0.0, 59 / 96),
-        (1 / 12, -59 / 96, 0.0, 59 / 96, -1 / 12),
-        (1 / 32, 0.0, -59 / 96, 0.0, 2 / 3, -1 / 12),
+SUMMATION_BY_PARTS = {
+    2: (((-1, -1 / 2), (1, 1 / 2)), (1 / 2,), ((-1 / 2, 1 / 2),)),
+    4: (
+        ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12)),
+        (17 / 48, 59 / 48, 43 / 48, 49 / 48),
+        (
+            (-1 / 2, 59 / 96, -1 / 12, -1 / 32),
+            (-59 / 96, 0.0, 59 / 96),
+            (1 / 12, -59 / 96, 0.0, 59 / 96, -1 / 12),
+            (1 / 32, 0.0, -59 / 96, 0.0, 2 / 3, -1 / 12),
+        ),
     ),
-)
-SUMMATION_BY_PARTS = {2: _SECOND, 4: _FOURTH}
-"""By order: stencil, norm and boundary rows. Source: Strand 1994."""
+}
+"""By order: the stencil inside as (offset, factor), the norm and the first rows at an end, times the interval.
+
+Source: Strand 1994.
+"""
 
 
 def central(m: int, order: int, damper: float) -> Mesh:

@@ -33,7 +33,7 @@ from shaftwork.network.netlist import (
     listed,
     title,
 )
-from shaftwork.network.sharing import Shared
+from shaftwork.network.templates import Shared
 
 LEFT_OUT = ("node name", "node count", "wrong domain", "no effect", "component")
 """Kinds of problems whose part is left out of what is examined further."""

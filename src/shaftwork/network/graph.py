@@ -18,8 +18,7 @@ from shaftwork.components.tables import Table
 from shaftwork.core.domains import ROTATION, Domain
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed, overview
-from shaftwork.network.sharing import Shared
-from shaftwork.network.templates import BranchTemplate, Template, make_template, with_factors
+from shaftwork.network.templates import BranchTemplate, Shared, Template, make_template, with_factors
 
 GROUND = -1
 """Node number of the reference."""

@@ -113,10 +113,9 @@ CHANGE = "change"
 """The label of what there is beyond a constant."""
 SAMPLES = (0.37, 1.9, 2.7)
 """What the other variables of a capacity are where its two sides of a jump are compared."""
-BESIDE = 1e-9
-"""So far beside a boundary, in parts of its place, conditions are read that hold on one side of it."""
-SAME = 1e-9
-"""Part of a capacity by which its two sides may differ where it does not jump; less is rounding."""
+ROUNDING = 1e-9
+"""So far beside a boundary, in parts of its place, conditions are read that hold on one side of it; and the part of a
+capacity by which its two sides may differ where it does not jump."""
 
 
 class StoreFaultError(ShaftworkError):
@@ -198,7 +197,7 @@ def _jumps(capacity: Expr) -> Iterator[str]:
         for shift in SAMPLES:
             at = {one: shift * (1 + number) for number, one in enumerate(sorted(others - {symbol}, key=str))}
             low, high = _sides(capacity.xreplace(at), symbol, float(place.xreplace(at)))
-            if low.is_real and high.is_real and abs(high - low) > SAME * max(abs(low), abs(high)):
+            if low.is_real and high.is_real and abs(high - low) > ROUNDING * max(abs(low), abs(high)):
                 shown = str(place) if place.free_symbols else f"{float(place):.6g}"
                 yield f"t = {shown} s" if symbol is TIME else f"the angle {shown}"
                 break
@@ -222,6 +221,6 @@ def _sides(capacity: Expr, symbol: Symbol, place: float) -> tuple[Expr, Expr]:
         capacity.xreplace({node: node.subs(symbol, place + offset) for node in capacity.atoms(*STEPS)}).subs(
             symbol, place
         )
-        for offset in (-BESIDE * max(1, abs(place)), BESIDE * max(1, abs(place)))
+        for offset in (-ROUNDING * max(1, abs(place)), ROUNDING * max(1, abs(place)))
     )
     return low, high
