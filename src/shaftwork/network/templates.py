@@ -219,14 +219,12 @@ def _occurring(derived: tuple[Derived, ...], laws: Iterable[Expr]) -> tuple[Deri
 
 
 class _Resolver:
-    """Branches as templates; a law that many branches of a part share is looked at once.
+    """Branches as templates; a law that many share is looked at once; `read` has all of them, as equations print them.
 
     Args:
         default: ends of a branch that names none.
         symbols: symbols of the parameters, in the order of their declaration.
         derived: laws of the derived quantities in the parameters.
-
-    `read` has every law so far, as equations print it.
     """
 
     def __init__(self, default: tuple[End, End], symbols: tuple[Symbol, ...], derived: Mapping[Symbol, Expr]) -> None:
