@@ -1,4 +1,15 @@
-"""How a long shaft becomes finitely many speeds and torques: the exchangeable models of a `Shaft`."""
+"""How a long shaft becomes finitely many speeds and torques: the exchangeable models of a `Shaft`.
+
+Every model but the wave is the same construction. The speeds omega_j stand at nodes x_j, each with a share of the
+shaft's inertia; the torques tau_k stand at stations y_k, each with a share of its length and so of its compliance. One
+matrix of weights w joins them, in both equations:
+
+    d(tau_k)/dt / (C' / l_k) = sum_j w_kj omega_j,     J' h_j d(omega_j)/dt = - sum_k w_kj tau_k + torque at the ends.
+
+Because it is the same matrix, the energy of the shaft changes by the powers at its two ends and by nothing else,
+whatever the weights are. Internal damping only takes energy: a damper stands beside each torque, or between each two
+neighbouring speeds.
+"""
 
 from __future__ import annotations
 
@@ -9,22 +20,64 @@ from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.polynomial.legendre import leggauss
 
-from shaftwork.components.shaft_meshes import (
-    SUMMATION_BY_PARTS,
-    Mesh,
-    central,
-    central_as_printed,
-    chain,
-    spectral,
-)
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.parameters import call_in, numbers_in_si, whole
+from shaftwork.core.parameters import call_in, in_si, whole
+from shaftwork.numerics.polynomials import lobatto_rule, to_slopes
 
 MOST_ELEMENTS = 100_000
 """Elements of a model; more is a typing error."""
 MOST_SPECTRAL = 200
 """Degree up to which the nodes and weights are right to rounding; beyond it, join several shafts."""
+
+
+Row = tuple[tuple[int, float], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A shaft as speeds at nodes and torques at stations.
+
+    Args:
+        intervals: how many times the unit of all shares goes into the shaft.
+        nodes: (n,) places of the speeds, from 0 to 1.
+        inertias: (n,) the length whose inertia is at each; they sum to the shaft, less what a closure leaves out.
+        stations: (k,) places of the torques.
+        lengths: (k,) the length whose compliance is that of each; they sum to the shaft.
+        weights: for each torque the nodes and factors that its rate of twist is the sum of.
+        dampers: (n - 1,) length of the damper between each two neighbouring speeds, where torque k stands at node k;
+            empty where a damper stands beside each torque, with its length.
+        first: number of the first torque.
+    """
+
+    intervals: int
+    nodes: tuple[float, ...]
+    inertias: tuple[float, ...]
+    stations: tuple[float, ...]
+    lengths: tuple[float, ...]
+    weights: tuple[Row, ...]
+    dampers: tuple[float, ...] = ()
+    first: int = 0
+
+
+SUMMATION_BY_PARTS = {
+    2: (((-1, -1 / 2), (1, 1 / 2)), (1 / 2,), ((-1 / 2, 1 / 2),)),
+    4: (
+        ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12)),
+        (17 / 48, 59 / 48, 43 / 48, 49 / 48),
+        (
+            (-1 / 2, 59 / 96, -1 / 12, -1 / 32),
+            (-59 / 96, 0.0, 59 / 96),
+            (1 / 12, -59 / 96, 0.0, 59 / 96, -1 / 12),
+            (1 / 32, 0.0, -59 / 96, 0.0, 2 / 3, -1 / 12),
+        ),
+    ),
+}
+"""By order: the stencil inside as (offset, factor), the norm and the first rows at an end, times the interval.
+
+Source: Strand 1994.
+"""
 
 
 @dataclass(frozen=True)
@@ -50,17 +103,13 @@ class ShaftModel:
             "Lumped(20)."
         )
 
+    @lru_cache(maxsize=32)  # noqa: B019 (of few models, which are small, one for all that are equal)
     def mesh(self) -> Mesh:
         """The nodes, stations and weights."""
-        return _mesh_of(self)
+        return self._mesh()
 
     def _mesh(self) -> Mesh:
         raise ParameterError(f"{self!r} has no mesh.")
-
-
-@lru_cache(maxsize=32)
-def _mesh_of(model: ShaftModel) -> Mesh:
-    return model._mesh()  # noqa: SLF001 (the same class, made once for equal models)
 
 
 @dataclass(frozen=True)
@@ -99,7 +148,15 @@ class Lumped(ShaftModel):
         _one_of(self, "ends", ("half", "full"))
 
     def _mesh(self) -> Mesh:
-        return chain(self.m, half_ends=self.ends == "half")
+        m = self.m
+        return Mesh(
+            intervals=m,
+            nodes=tuple(k / m for k in range(m + 1)),
+            inertias=(0.5, *[1.0] * (m - 1), 0.5) if self.ends == "half" else (m / (m + 1),) * (m + 1),
+            stations=tuple((k + 0.5) / m for k in range(m)),
+            lengths=(1.0,) * m,
+            weights=tuple(((k, 1.0), (k + 1, -1.0)) for k in range(m)),
+        )
 
 
 @dataclass(frozen=True)
@@ -163,14 +220,45 @@ class CentralDifference(ShaftModel):
             raise ParameterError(
                 f"{self!r}: the printed closure is of order 2. Leave order out, or take closure='sbp'."
             )
-        _, norm, _ = SUMMATION_BY_PARTS[self.order]
-        _whole(self, "m", 2 * len(norm) if self.closure == "sbp" else 3, MOST_ELEMENTS)
+        closed = len(SUMMATION_BY_PARTS[self.order][1])
+        _whole(self, "m", 2 * closed if self.closure == "sbp" else 3, MOST_ELEMENTS)
 
     def _mesh(self) -> Mesh:
-        damper = 1.0 if self.second_difference == "consistent" else 2.0
+        dampers = (1.0 if self.second_difference == "consistent" else 2.0,) * self.m
+        nodes = tuple(k / self.m for k in range(self.m + 1))
         if self.closure == "printed":
-            return central_as_printed(self.m, damper)
-        return central(self.m, self.order, damper)
+            return _as_printed(self.m, nodes, dampers)
+        m, (inside, norm, rows) = self.m, SUMMATION_BY_PARTS[self.order]
+        shares = [1.0] * (m + 1)
+        shares[: len(norm)], shares[m + 1 - len(norm) :] = norm, norm[::-1]
+        weights = []
+        for k in range(m + 1):
+            if k < len(rows):
+                row = [(j, -q) for j, q in enumerate(rows[k])]
+            elif k > m - len(rows):
+                row = [(m - j, q) for j, q in enumerate(rows[m - k])][::-1]
+            else:
+                row = [(k + offset, -q) for offset, q in inside]
+            weights.append(tuple((j, weight) for j, weight in row if weight))
+        return Mesh(m, nodes, tuple(shares), nodes, tuple(shares), tuple(weights), dampers)
+
+
+def _as_printed(m: int, nodes: tuple[float, ...], dampers: tuple[float, ...]) -> Mesh:
+    """Torques at the m - 1 nodes between the ends, whose speeds have no inertia of the shaft.
+
+    The rows of the first and last torque are those that make, transposed, the equations of the speeds as printed.
+    """
+    inside = (((k - 1, 0.5), (k + 1, -0.5)) for k in range(2, m - 1))
+    return Mesh(
+        intervals=m,
+        nodes=nodes,
+        inertias=(0.0, *[1.0] * (m - 1), 0.0),
+        stations=nodes[1:-1],
+        lengths=(1.5, *[1.0] * (m - 3), 1.5),
+        weights=(((0, 1.0), (1, -0.5), (2, -0.5)), *inside, ((m - 2, 0.5), (m - 1, 0.5), (m, -1.0))),
+        dampers=dampers,
+        first=1,
+    )
 
 
 @dataclass(frozen=True)
@@ -195,7 +283,18 @@ class Spectral(ShaftModel):
         _whole(self, "n", 1, MOST_SPECTRAL)
 
     def _mesh(self) -> Mesh:
-        return spectral(self.n)
+        nodes, inertias = lobatto_rule(self.n)
+        stations, lengths = leggauss(self.n)
+        # a rigid rotation twists nothing, to the last bit
+        slopes = -to_slopes(nodes, stations) * lengths[:, None]
+        return Mesh(
+            intervals=1,
+            nodes=tuple(((nodes + 1) / 2).tolist()),
+            inertias=tuple((inertias / 2).tolist()),
+            stations=tuple(((stations + 1) / 2).tolist()),
+            lengths=tuple((lengths / 2).tolist()),
+            weights=tuple(tuple(enumerate(row)) for row in slopes.tolist()),
+        )
 
 
 @dataclass(frozen=True)
@@ -240,11 +339,9 @@ class Auto(ShaftModel):
     purpose: ClassVar[str] = "the smallest spectral model that is right up to a frequency"
 
     def __post_init__(self) -> None:
-        for name, least, most in (("f_max", 0.0, 1e12), ("tolerance", 1e-12, 0.1)):
-            value = numbers_in_si(f"Auto: {name}", getattr(self, name), "Hz" if name == "f_max" else "1")
+        for name, unit, least, most in (("f_max", "Hz", 0.0, 1e12), ("tolerance", "1", 1e-12, 0.1)):
+            value = in_si(f"Auto: {name}", getattr(self, name), unit, at_least=least, at_most=most)
             object.__setattr__(self, name, value)
-            if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value <= most:
-                raise ParameterError(f"Auto: {name} = {value!r} must be a number from {least:g} to {most:g}.")
 
     def chosen(self, delay: float) -> Spectral:
         """The model for a shaft that a wave crosses in a delay, s.
@@ -253,13 +350,12 @@ class Auto(ShaftModel):
             ParameterError: the shaft is too long for one polynomial.
         """
         waves = 2 * self.f_max * delay  # half waves along the shaft at the highest frequency
-        degree = _smallest_degree(waves, self.tolerance)
-        if degree is not None:
-            return Spectral(degree)
-        raise ParameterError(
-            f"{self!r} asks for {waves:.0f} half waves along the shaft, more than one polynomial holds. "
-            f"Divide the shaft into several in a row, or lower f_max."
-        )
+        if (degree := _smallest_degree(waves, self.tolerance)) is None:
+            raise ParameterError(
+                f"{self!r} asks for {waves:.0f} half waves along the shaft, more than one polynomial holds. "
+                f"Divide the shaft into several in a row, or lower f_max."
+            )
+        return Spectral(degree)
 
 
 @lru_cache(maxsize=256)
@@ -292,16 +388,13 @@ MODELS: tuple[type[ShaftModel], ...] = (Rigid, OneSpring, Lumped, CentralDiffere
 
 
 def _whole(model: ShaftModel, name: str, least: int, most: int) -> None:
-    value = getattr(model, name)
-    if (count := whole(value, least, most)) is None:
-        raise ParameterError(
-            f"{type(model).__name__}: {name} = {value!r} must be a whole number from {least} to {most}."
-        )
+    if (count := whole(getattr(model, name), least, most)) is None:
+        shown = f"{type(model).__name__}: {name} = {getattr(model, name)!r}"
+        raise ParameterError(f"{shown} must be a whole number from {least} to {most}.")
     object.__setattr__(model, name, count)
 
 
 def _one_of(model: ShaftModel, name: str, choices: tuple[Any, ...]) -> None:
-    value = getattr(model, name)
-    if value not in choices:
-        listed = ", ".join(repr(choice) for choice in choices)
+    if (value := getattr(model, name)) not in choices:
+        listed = ", ".join(map(repr, choices))
         raise ParameterError(f"{type(model).__name__}: {name} = {value!r} must be one of: {listed}.")
