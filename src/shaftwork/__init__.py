@@ -51,7 +51,6 @@ if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
         v as v,
     )
     from shaftwork.components.loads import *
-    from shaftwork.components.electrical import *
     from shaftwork.components.modes import Leave as Leave, Mode as Mode, Modes as Modes
     from shaftwork.components.drives import motors as motors
     from shaftwork.components.motors import *
@@ -67,9 +66,7 @@ if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
         Wave as Wave,
     )
     from shaftwork.components.shafts import *
-    from shaftwork.components.sources import *
     from shaftwork.components.tables import Table as Table
-    from shaftwork.components.mechanics import *
     from shaftwork.core.domains import ELECTRICAL as ELECTRICAL, ROTATION as ROTATION, TRANSLATION as TRANSLATION
     from shaftwork.core.errors import (
         AccuracyWarning as AccuracyWarning,
