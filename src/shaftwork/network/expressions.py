@@ -263,11 +263,10 @@ class _LawReader:
         """The expression of its parts; computed with plain floats first, so that nothing huge or imaginary is built."""
         number: float | None = None
         try:
-            if value is not None and (numbers := [part.value for part in parts if part.value is not None]):
-                total = value(*numbers)
-                if not math.isfinite(total):
-                    raise OverflowError(total)
-                number = total if len(numbers) == len(parts) else None
+            if value is not None and all(part.value is not None for part in parts):
+                number = value(*(part.value for part in parts))
+                if not math.isfinite(number):
+                    raise OverflowError(number)
             expression = make(*(part.expression for part in parts))
             fault = fault_of(expression)
         except (ArithmeticError, ValueError, TypeError):
