@@ -18,7 +18,7 @@ from shaftwork.hybrid.modes.mode_machines import ModeNames, elements_of, with_mo
 from shaftwork.hybrid.modes.reactions import MANY, ReactionEquations, laws_that_hold
 from shaftwork.hybrid.modes.resting import at_rest
 from shaftwork.integrate import choice
-from shaftwork.integrate.engines import ADAMS, available
+from shaftwork.integrate.engines import ADAMS, ENGINES, INNER, WAVE, available
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.model import Model
@@ -26,15 +26,11 @@ from shaftwork.waves.hybrid_waves import WaveModeEquations
 from shaftwork.waves.wave_motion import engine_of_waves
 
 FOLLOWING = {
-    "heyoka": (1.0, 1e-12),  # the cost grows only with the logarithm
-    "scipy": (1 / 30, 1e-7),
-    "scipy-radau": (1 / 30, 1e-7),
-    "sundials": (1 / 300, 1e-8),
-    ADAMS: (1 / 100, 1e-8),
-    "wave": (1.0, 1e-6),  # its panels leave out a tenth of the tolerance
+    name: entry.following
+    for name, entry in (*ENGINES.items(), *INNER.items(), ("wave", WAVE))
+    if entry.following is not None
 }
-"""Engines that follow guards. An error grows with every change of mode, by some hundreds through sixty contacts, so
-they run with this part of the tolerance that is asked for, and with no looser one than the second number."""
+"""Engines that follow guards: the part of the tolerance that they run with, and the loosest one."""
 STILL = 1e-9
 """A speed that is no more than this, where all speeds are about 1, is none."""
 _ENGINES = ", ".join(name for name in FOLLOWING if name not in (ADAMS, "wave"))
