@@ -24,17 +24,8 @@ from shaftwork.components.branches import (
     rigid,
     through_of,
 )
-from shaftwork.components.shaft_models import (
-    Auto,
-    CentralDifference,
-    Lumped,
-    Mesh,
-    OneSpring,
-    Rigid,
-    Row,
-    ShaftModel,
-    Wave,
-)
+from shaftwork.components.shaft_meshes import Mesh, Row
+from shaftwork.components.shaft_models import Auto, CentralDifference, Lumped, OneSpring, Rigid, ShaftModel, Wave
 from shaftwork.core.domains import ROTATION
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter
