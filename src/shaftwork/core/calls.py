@@ -130,7 +130,7 @@ Key = TypeVar("Key", bound=Hashable)
 Value = TypeVar("Value")
 
 
-class Kept(Generic[Key, Value]):
+class BoundedCache(Generic[Key, Value]):
     """The last few values, by key.
 
     Threads that need the same key at once may compute it twice, and all get the first value.
@@ -153,4 +153,4 @@ class Kept(Generic[Key, Value]):
             return self._values.setdefault(key, value)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Kept, (self._most,)  # locks cannot be stored
+        return BoundedCache, (self._most,)  # locks cannot be stored

@@ -9,7 +9,7 @@ import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.components.modes import ModeChoice
-from shaftwork.core.calls import Kept
+from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import NetworkError, NetworkWarning, ParameterError
 from shaftwork.core.notices import muted
 from shaftwork.formulation.value_diagnosis import self_locks
@@ -53,7 +53,7 @@ class Phases:
         self._holding: dict[tuple[tuple[str, ...], tuple[int, ...]], ReactionEquations] = {}
         self._engines: dict[tuple[ModeEquations, ModeNames, str], tuple[str, str]] = {}
         self._easy: dict[ModeEquations, dict[tuple[int, str], tuple[str, str]]] = {}
-        self.last_run = Kept[Any, Any](1)
+        self.last_run = BoundedCache[Any, Any](1)
         """What the last run has learned, by its values and times: the next like it goes on with that."""
 
     def assembly(self, modes: ModeNames) -> ModeEquations:

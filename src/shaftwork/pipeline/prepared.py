@@ -17,7 +17,7 @@ from shaftwork.codegen.array_form.recovery import BranchHistory
 from shaftwork.codegen.compiled_model import CompiledModel
 from shaftwork.codegen.times.time_switches import Switching
 from shaftwork.codegen.valueless import rough, without_value
-from shaftwork.core.calls import Kept
+from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import CompileError
 from shaftwork.formulation.form import StateForm
 from shaftwork.integrate.engines import available
@@ -58,7 +58,7 @@ class EngineModel(CompiledModel, ABC):
 
     def __init__(self, form: StateForm) -> None:
         super().__init__(form)
-        self._prepared = Kept[bytes, Prepared](1)
+        self._prepared = BoundedCache[bytes, Prepared](1)
 
     @property
     @abstractmethod

@@ -16,7 +16,7 @@ from shaftwork.codegen.starts.start_values import initial_state
 from shaftwork.components.modes import ModeChoice
 from shaftwork.components.shaft_models import MOST_SPECTRAL, OneSpring, Rigid, Spectral, Wave
 from shaftwork.components.shafts import Shaft
-from shaftwork.core.calls import Kept
+from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import AccuracyWarning, NetworkWarning, ParameterError
 from shaftwork.core.notices import muted
 from shaftwork.frequency.analysis import (
@@ -89,7 +89,7 @@ class ExactNetwork:
 
     def __init__(self, model: Model, compiled: Compile, shafts: Mapping[str, Shaft]) -> None:
         self._model, self._compiled, self._shafts = model, compiled, shafts
-        self._meshes = Kept[tuple[int, ...], Model](MESHES)
+        self._meshes = BoundedCache[tuple[int, ...], Model](MESHES)
 
     @cached_property
     def _own(self) -> Model:
@@ -220,7 +220,7 @@ class ExactPhases:
 
     def __init__(self, model: PhasedModel, compiled: Compile, shafts: Mapping[str, Shaft]) -> None:
         self._model, self._compiled, self._shafts = model, compiled, shafts
-        self._networks = Kept[ModeNames, ExactNetwork](MESHES)
+        self._networks = BoundedCache[ModeNames, ExactNetwork](MESHES)
 
     @cached_property
     def _own(self) -> PhasedModel:

@@ -28,7 +28,7 @@ import numpy as np
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.mobility import Mobility, complementary
 from shaftwork.components.modes import Leave
-from shaftwork.core.calls import Kept
+from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import SimulationError
 from shaftwork.hybrid.hybrid_state import HybridState, Regime
 from shaftwork.hybrid.impacts.impact_contacts import Contact, in_turn, lasting, nodes, opens_at, touching
@@ -72,7 +72,7 @@ class Collisions:
     def __init__(self, regimes: Regimes, impulses: Impulses, *, together: bool) -> None:
         self._regimes, self._elements = regimes, regimes.elements
         self._impulses, self._together = impulses, together
-        self._mobilities = Kept[tuple[Regime, tuple[tuple[int, int], ...]], Mobility](MOBILITIES)
+        self._mobilities = BoundedCache[tuple[Regime, tuple[tuple[int, int], ...]], Mobility](MOBILITIES)
 
     def impact(self, t: float, moment: HybridState, number: int, leave: Leave) -> Collision:
         """The impact of an element that closes.

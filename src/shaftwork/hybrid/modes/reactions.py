@@ -25,7 +25,7 @@ from shaftwork.codegen.array_form.products import Factor
 from shaftwork.codegen.compiled_model import ScalarProgram
 from shaftwork.components.discontinuities import parts
 from shaftwork.components.noise import HeldNoise, SmoothNoise
-from shaftwork.core.calls import Kept
+from shaftwork.core.calls import BoundedCache
 from shaftwork.formulation.form import StateForm
 from shaftwork.hybrid.modes.held_rows import HeldRows, groups, held_places
 from shaftwork.hybrid.modes.joints import HeldArrays, HeldStores, Joints
@@ -69,7 +69,9 @@ class ReactionEquations(ModeEquations):
     def holding(self, numbers: tuple[int, ...]) -> ReactionEquations:
         """The equations in which the elements of these numbers hold."""
         other = copy(self)
-        caches: dict[str, Any] = {name: Kept(KEPT_RATES) for name in ("_guards_by_p", "_rates_by_p", "_problems")}
+        caches: dict[str, Any] = {
+            name: BoundedCache(KEPT_RATES) for name in ("_guards_by_p", "_rates_by_p", "_problems")
+        }
         laws = [law for k in numbers if (law := self._laws[k]) is not None]
         vars(other).update(_held=laws, _joints=None, _factors=None, _holds=None, **caches)
         return other
