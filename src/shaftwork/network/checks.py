@@ -178,10 +178,10 @@ class _Examination:
         """The part with values that can be used in place of those that cannot; None if it yields no branches."""
         part = placed.part
         try:
-            resolved, objections = resolve(placed)
+            values, objections = resolve(part)
             for name, value, objection in objections:
                 self._report_value(placed, name, value, objection)
-            faults = self._faults_of(part, resolved.values)
+            faults = self._faults_of(part, values)
         except ShaftworkError as error:
             self.report("component", f"{title(part)}: {error}", "Correct its branches().", placed)
             return None

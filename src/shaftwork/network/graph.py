@@ -192,24 +192,16 @@ def ends_of(branch: GraphBranch) -> tuple[tuple[tuple[int, int], int, int], ...]
     return (((branch.index, 0), branch.plus, branch.minus),)
 
 
-@dataclass(frozen=True)
-class ResolvedPart:
-    """A placed component with its parameter values in SI: floats, or expressions for laws."""
-
-    placed: Placed
-    values: Mapping[str, Any]
-
-
-def resolve(placed: Placed) -> tuple[ResolvedPart, tuple[tuple[str, Any, str], ...]]:
-    """The part with its values in SI, and the objections as (parameter, given value, objection).
+def resolve(part: Component) -> tuple[dict[str, Any], tuple[tuple[str, Any, str], ...]]:
+    """Values of a part in SI, floats or expressions of laws; and the objections as (parameter, given value, objection).
 
     A value that cannot be used is replaced by 1, a record by its default, so that the analysis of the network can go on
     and report everything.
     """
     values: dict[str, Any] = {}
     objections: list[tuple[str, Any, str]] = []
-    for name, declared in placed.part.declared.items():
-        entry = getattr(placed.part, name)
+    for name, declared in part.declared.items():
+        entry = getattr(part, name)
         value, objection = declared.magnitude(entry)
         if objection is None and not isinstance(value, float):
             value = as_expression(value) if isinstance(value, Table | Expr) else value  # the checks name the rest
@@ -217,7 +209,7 @@ def resolve(placed: Placed) -> tuple[ResolvedPart, tuple[tuple[str, Any, str], .
             objections.append((name, entry, objection))
             value = 1.0 if declared.record is None or declared.required else declared.magnitude(declared.default)[0]
         values[name] = value
-    return ResolvedPart(placed, values), tuple(objections)
+    return values, tuple(objections)
 
 
 class _Table:
@@ -237,7 +229,6 @@ class _Table:
 
 def build_graph(netlist: Netlist) -> CircuitGraph:
     """Netlist to graph. The netlist must have passed `checks.examine`."""
-    resolved = tuple(resolve(placed)[0] for placed in netlist.placed)
     table = _Table()
     for placed in netlist.placed:  # ports with a domain first, so that a Ground does not decide the domain of its node
         for port, node in zip(placed.part.ports, placed.nodes, strict=False):
@@ -247,15 +238,15 @@ def build_graph(netlist: Netlist) -> CircuitGraph:
     zeros: list[str] = []
     parts: list[GraphPart] = []
     branches: list[GraphBranch] = []
-    for item in resolved:
-        part, values = item.placed.part, item.values
-        template, read = table.templates.of(part, values, item.placed.choices)
+    for item in netlist.placed:
+        part, (values, _) = item.part, resolve(item.part)
+        template, read = table.templates.of(part, values, item.choices)
         places: dict[str, int] = {}
         for name in template.parameters:
             places[name] = len(parameters)
             parameters[f"{part.name}.{name}"] = values.get(name, 0.0)  # numbers of modes are no values of the part
         zeros.extend(f"{part.name}.{name}" for name, value in values.items() if isinstance(value, float) and not value)
-        nodes = _port_nodes(item.placed, table)
+        nodes = _port_nodes(item, table)
         first = len(branches)
         branches.extend(_place(branch, first + k, len(parts), nodes) for k, branch in enumerate(template.branches))
         numbers = tuple(range(first, len(branches)))
@@ -295,7 +286,7 @@ def effective(graph: CircuitGraph) -> frozenset[str]:
 
 
 def _effective_of(part: GraphPart, templates: Shared[Template]) -> Iterator[str]:
-    values = resolve(Placed(part.component, ()))[0].values
+    values = resolve(part.component)[0]
     forms = [templates.of(part.component, values, choices)[0] for choices in _mode_choices(part.modes)]
     laws = {item.name: item.law for template in forms for item in template.derived}
     pending, read = list(_symbols_of(forms)), set(part.consulted)

@@ -38,7 +38,7 @@ from shaftwork.frequency.natural_modes import Modes, find_modes
 from shaftwork.hybrid.modes.mode_machines import ModeNames
 from shaftwork.hybrid.phased_model import PhasedModel
 from shaftwork.network.graph import resolve
-from shaftwork.network.netlist import Netlist, Placed
+from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.model import Model
 from shaftwork.results.solution import Solution
 
@@ -106,7 +106,7 @@ class ExactNetwork:
     @cached_property
     def _values(self) -> tuple[Mapping[str, float], ...]:
         """The parameters of the exact shafts in SI."""
-        return tuple(resolve(Placed(shaft, ()))[0].values for shaft in self._shafts.values())
+        return tuple(resolve(shaft)[0] for shaft in self._shafts.values())
 
     @cached_property
     def lines(self) -> ExactLines:
