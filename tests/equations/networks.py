@@ -28,8 +28,8 @@ from shaftwork.components.sources import ForceSource, SpeedSource, TorqueSource
 from shaftwork.equations.kirchhoff import kirchhoff
 from shaftwork.equations.records import Equations
 from shaftwork.formulation.form import state_form
-from shaftwork.network.builder import NetworkBuilder
 from shaftwork.network.graph import CircuitGraph, build_graph
+from shaftwork.network.netlist import NetworkBuilder
 from tests.reference.mna import Piece
 
 

@@ -25,7 +25,7 @@ from shaftwork.components.sources import TorqueSource
 from shaftwork.core.errors import CompileError, ShaftworkError
 from shaftwork.core.parameters import parameter
 from shaftwork.latex.printing import WIDEST_CASE, printed_number, printed_width
-from shaftwork.network.builder import NetworkBuilder
+from shaftwork.network.netlist import NetworkBuilder
 from shaftwork.scenes import SCENES
 from tests.equations.networks import MECHANICAL, crane, dc_drive, equations_of, hoist, mixed_train, shaft, train
 

@@ -34,7 +34,7 @@ from shaftwork.equations.quantities import rate_of
 from shaftwork.equations.records import Equations
 from shaftwork.formulation.explicit_rows import BlockTooLargeError, explicit_rows
 from shaftwork.formulation.form import state_form
-from shaftwork.network.builder import NetworkBuilder
+from shaftwork.network.netlist import NetworkBuilder
 from shaftwork.scenes import SCENES
 from tests.equations.networks import (
     MECHANICAL,

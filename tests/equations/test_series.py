@@ -8,7 +8,7 @@ from shaftwork.components.mechanics import Damper, Inertia, Spring
 from shaftwork.latex.printing import Line
 from shaftwork.latex.series import shortened
 from shaftwork.latex.spelling import INDEX_CLOSES, INDEX_OPENS
-from shaftwork.network.builder import NetworkBuilder
+from shaftwork.network.netlist import NetworkBuilder
 from tests.equations.networks import equations_of
 
 

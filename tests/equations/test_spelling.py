@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from shaftwork.components.mechanics import Inertia, Spring
 from shaftwork.latex.spelling import ACCENTED, chosen_subscript, escaped, in_text
-from shaftwork.network.builder import NetworkBuilder
+from shaftwork.network.netlist import NetworkBuilder
 from tests.equations.networks import equations_of
 from tests.equations.test_latex import compile_latex, compiles, overfull, symbols
 

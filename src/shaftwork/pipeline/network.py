@@ -21,9 +21,8 @@ from shaftwork.formulation.form import StateForm, state_form
 from shaftwork.hybrid.named_phases import during, in_phase, span_of, whole_name, words_of
 from shaftwork.hybrid.phased_model import PhasedModel
 from shaftwork.modelfiles.storage import read_netlist, write_netlist
-from shaftwork.network.builder import NetworkBuilder
 from shaftwork.network.graph import CircuitGraph
-from shaftwork.network.netlist import Netlist
+from shaftwork.network.netlist import Netlist, NetworkBuilder
 from shaftwork.pipeline.angles import with_angles
 from shaftwork.pipeline.arguments import as_names
 from shaftwork.pipeline.model import Model
