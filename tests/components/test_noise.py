@@ -28,7 +28,7 @@ PLACES = np.concatenate([np.linspace(-3.0, 3.0, 601), [-1e9 - 0.5, 2.0**40, 1e15
 
 def test_the_generator_is_splitmix64() -> None:
     """Its first numbers of the state 1234567, as its authors' program prints them."""
-    words = [noise._mixed(1234567 + k * noise._GAMMA & noise._LAST) for k in range(1, 6)]
+    words = [noise._split_mix(1234567, k) for k in range(1, 6)]
     known = [6457827717110365317, 3203168211198807973, 9817491932198370423, 4593380528125082431, 16408922859458223821]
     assert words == known
 
