@@ -170,7 +170,11 @@ def replaced(expression: Basic, replacements: Mapping[Any, Any]) -> Any:
 
 
 def _limit(function: type[Basic], args: Any) -> Any:
-    """A limit of the arguments, which are compared where all of them are numbers."""
+    """A limit of the arguments, which are compared where all of them are numbers.
+
+    sympy compares the arguments of every Max and Min that it makes, by factoring their difference: 20 ms for a
+    controller's limit, at each of the hundreds of times that an expression around it is made anew.
+    """
     compared = all(getattr(one, "is_number", True) for one in args)
     return function(*args) if compared else function(*args, evaluate=False)
 

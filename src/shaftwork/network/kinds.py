@@ -51,6 +51,13 @@ class Kind(IntEnum):
 
 Resolved = tuple[Kind, Expr]
 """A kind and the law of a branch of that kind."""
+CHANGE = "change"
+"""The label of what there is beyond a constant."""
+SAMPLES = (0.37, 1.9, 2.7)
+"""What the other variables of a capacity are where its two sides of a jump are compared."""
+ROUNDING = 1e-9
+"""So far beside a boundary, in parts of its place, conditions are read that hold on one side of it; and the part of a
+capacity by which its two sides may differ where it does not jump."""
 
 
 def law_of(law: Any, branch: Branch, number: int) -> Expr:
@@ -107,15 +114,6 @@ def _through_law(through: Expr) -> Iterator[Resolved]:
     rest = through.subs(ACROSS, 0)
     if rest != 0 and not rest.has(nan):
         yield Kind.LAW if rest.has(INTEGRAL) or readings_in(rest) else Kind.THROUGH_SOURCE, rest
-
-
-CHANGE = "change"
-"""The label of what there is beyond a constant."""
-SAMPLES = (0.37, 1.9, 2.7)
-"""What the other variables of a capacity are where its two sides of a jump are compared."""
-ROUNDING = 1e-9
-"""So far beside a boundary, in parts of its place, conditions are read that hold on one side of it; and the part of a
-capacity by which its two sides may differ where it does not jump."""
 
 
 class StoreFaultError(ShaftworkError):
