@@ -34,7 +34,7 @@ if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
     )
     from shaftwork.components.bucket_wheel import *
     from shaftwork.components.contacts import *
-    from shaftwork.components.controllers import *
+    from shaftwork.components.sources import *
     from shaftwork.components.drives import *
     from shaftwork.components.electrical import *
     from shaftwork.components.friction import *
@@ -51,12 +51,11 @@ if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
         v as v,
     )
     from shaftwork.components.loads import *
-    from shaftwork.components.machines import *
     from shaftwork.components.modes import Leave as Leave, Mode as Mode, Modes as Modes
-    from shaftwork.components.motor_catalogue import motors as motors
+    from shaftwork.components.drives import motors as motors
     from shaftwork.components.motors import *
     from shaftwork.components.noise import HeldNoise as HeldNoise, SmoothNoise as SmoothNoise
-    from shaftwork.components.rotation import *
+    from shaftwork.components.mechanics import *
     from shaftwork.components.shaft_models import (
         Auto as Auto,
         CentralDifference as CentralDifference,
@@ -67,9 +66,7 @@ if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
         Wave as Wave,
     )
     from shaftwork.components.shafts import *
-    from shaftwork.components.sources import *
     from shaftwork.components.tables import Table as Table
-    from shaftwork.components.translation import *
     from shaftwork.core.domains import ELECTRICAL as ELECTRICAL, ROTATION as ROTATION, TRANSLATION as TRANSLATION
     from shaftwork.core.errors import (
         AccuracyWarning as AccuracyWarning,
@@ -119,7 +116,7 @@ _HOME = {
         "Spectral",
         "Wave",
     ),
-    "shaftwork.components.motor_catalogue": ("motors",),
+    "shaftwork.components.drives": ("motors",),
     "shaftwork.components.bucket_wheel": ("Soil",),
     "shaftwork.components.noise": ("HeldNoise", "SmoothNoise"),
     "shaftwork.components.tables": ("Table",),

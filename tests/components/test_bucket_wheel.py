@@ -139,3 +139,8 @@ def test_a_wheel_that_digs_at_once_from_a_time_on_gives_nothing_before_and_its_t
     assert (late["dig.tau"][:2] == 0.0).all()
     np.testing.assert_allclose(late["dig.tau"][2:], always["dig.tau"][2:], rtol=1e-9)
     assert (always["dig.tau"] != 0.0).all()
+
+
+def test_the_mean_torque_of_a_wheel_that_cannot_be_is_refused() -> None:
+    with pytest.raises(sw.ParameterError, match=r"BucketWheelLoad 'dig': radius = -1\.0 must be above 0"):
+        _ = sw.BucketWheelLoad("dig", radius=-1.0, edge=0.6).mean_torque

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sympy import Max, Min
 
-from shaftwork.components.clips import larger, replaced, smaller
+from shaftwork.components.laws import larger, replaced, smaller
 
 X, Y, Z = sympy.symbols("x y z", real=True)
 

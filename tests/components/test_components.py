@@ -18,7 +18,6 @@ from shaftwork.components.laws import t
 from shaftwork.core.domains import DOMAINS
 from shaftwork.network.graph import resolve
 from shaftwork.network.kinds import Kind
-from shaftwork.network.netlist import Placed
 from shaftwork.network.templates import make_template
 
 OWN = [name for name, kind in REGISTRY.items() if kind.__module__.startswith("shaftwork.")]
@@ -43,6 +42,14 @@ def _made(name: str, **changes: Any) -> sw.Component:
 def test_every_component_is_a_public_name_with_a_law_in_its_docstring(name: str) -> None:
     assert getattr(sw, name) is REGISTRY[name]
     assert "Law:" in str(REGISTRY[name].__doc__)
+
+
+def test_what_a_base_class_declares_for_all_of_its_parts_comes_last() -> None:
+    shared = ["ratio", "efficiency", "t_on", "t_off"]
+    for kind in (sw.KlossMotor, sw.CageMotor, sw.TableMotor, sw.FrequencyDrive):
+        assert [*kind.declared][-4:] == shared
+    assert [*sw.CoulombLoad.declared] == ["tau", "omega_s"]
+    assert [*sw.Clutch.declared] == [*sw.Brake.declared]
 
 
 @pytest.mark.parametrize("name", OWN)
@@ -98,7 +105,7 @@ def test_every_component_refuses_what_it_does_not_know_with_what_it_takes(name: 
 def test_couplings_are_power_conserving_and_others_end_at_ports(name: str) -> None:
     """Every end of a branch is a port, an inner node or the frame."""
     part = _made(name)
-    values = resolve(Placed(part, ()))[0].values
+    values = resolve(part)[0]
     ends = {None, *(port.name for port in (*part.ports, *part.inner_ports()))}
     for branch in make_template(part, values).branches:
         found = [*branch.ends, *(end for _, plus, minus in branch.terms for end in (plus, minus))]

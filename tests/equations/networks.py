@@ -5,21 +5,31 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from shaftwork.components.base import REGISTRY
-from shaftwork.components.electrical import VoltageSource
+from shaftwork.components.electrical import DCMachine, VoltageSource
 from shaftwork.components.laws import omega, phi, t
 from shaftwork.components.loads import CoulombLoad, ViscousLoad
-from shaftwork.components.machines import DCMachine
+from shaftwork.components.mechanics import (
+    Damper,
+    Drum,
+    Gear,
+    Ground,
+    Inertia,
+    Mass,
+    PlanetaryGear,
+    Spring,
+    TranslationalDamper,
+    TranslationalSpring,
+    Wheel,
+)
 from shaftwork.components.motors import KlossMotor
-from shaftwork.components.rotation import Damper, Gear, Ground, Inertia, PlanetaryGear, Spring
 from shaftwork.components.shaft_models import ShaftModel
 from shaftwork.components.shafts import Shaft
 from shaftwork.components.sources import ForceSource, SpeedSource, TorqueSource
-from shaftwork.components.translation import Drum, Mass, TranslationalDamper, TranslationalSpring, Wheel
 from shaftwork.equations.kirchhoff import kirchhoff
 from shaftwork.equations.records import Equations
 from shaftwork.formulation.form import state_form
-from shaftwork.network.builder import NetworkBuilder
 from shaftwork.network.graph import CircuitGraph, build_graph
+from shaftwork.network.netlist import NetworkBuilder
 from tests.reference.mna import Piece
 
 

@@ -15,18 +15,17 @@ from sympy import Add, Heaviside, Piecewise, sin
 
 from shaftwork.components import base
 from shaftwork.components.branches import Branch, ThroughLaw
-from shaftwork.components.electrical import Resistor, VoltageSource
+from shaftwork.components.electrical import DCMachine, Resistor, VoltageSource
 from shaftwork.components.friction import Brake
 from shaftwork.components.laws import omega, t
 from shaftwork.components.loads import Conveyor
-from shaftwork.components.machines import DCMachine
-from shaftwork.components.rotation import Damper, Inertia, Spring
+from shaftwork.components.mechanics import Damper, Inertia, Spring
 from shaftwork.components.shaft_models import CentralDifference, Lumped, ShaftModel, Wave
 from shaftwork.components.sources import TorqueSource
 from shaftwork.core.errors import CompileError, ShaftworkError
 from shaftwork.core.parameters import parameter
 from shaftwork.latex.printing import WIDEST_CASE, printed_number, printed_width
-from shaftwork.network.builder import NetworkBuilder
+from shaftwork.network.netlist import NetworkBuilder
 from shaftwork.scenes import SCENES
 from tests.equations.networks import MECHANICAL, crane, dc_drive, equations_of, hoist, mixed_train, shaft, train
 

@@ -16,7 +16,7 @@ from sympy import Derivative, Expr, Function, Rational, Symbol, dsolve, exp, sim
 from shaftwork.components.base import REGISTRY, Component, Derived, Port, component
 from shaftwork.components.branches import ACROSS, AcrossStore, Branch
 from shaftwork.components.laws import t
-from shaftwork.components.rotation import Damper, Gear, Inertia, Spring
+from shaftwork.components.mechanics import Damper, Gear, Inertia, Spring
 from shaftwork.components.shaft_models import (
     CentralDifference,
     Lumped,
@@ -34,7 +34,7 @@ from shaftwork.equations.quantities import rate_of
 from shaftwork.equations.records import Equations
 from shaftwork.formulation.explicit_rows import BlockTooLargeError, explicit_rows
 from shaftwork.formulation.form import state_form
-from shaftwork.network.builder import NetworkBuilder
+from shaftwork.network.netlist import NetworkBuilder
 from shaftwork.scenes import SCENES
 from tests.equations.networks import (
     MECHANICAL,
@@ -245,7 +245,7 @@ def test_rates_of_many_coupled_inertias_stay_together() -> None:
         net.add(Inertia(f"J{k}", J=1.0 + k), f"n{k}")
     for k in range(4):
         net.add(Spring(f"s{k}", c=1.0), f"n{k}", f"n{k + 1}")
-    from shaftwork.components.rotation import PlanetaryGear
+    from shaftwork.components.mechanics import PlanetaryGear
 
     for k in range(3):
         net.add(Inertia(f"C{k}", J=1.0), f"c{k}")

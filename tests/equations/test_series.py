@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from shaftwork.components.rotation import Damper, Inertia, Spring
+from shaftwork.components.mechanics import Damper, Inertia, Spring
 from shaftwork.equations.spelling import INDEX_CLOSES, INDEX_OPENS
 from shaftwork.latex.printing import Line
 from shaftwork.latex.series import shortened
-from shaftwork.network.builder import NetworkBuilder
+from shaftwork.network.netlist import NetworkBuilder
 from tests.equations.networks import equations_of
 
 

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shaftwork.components.rotation import Inertia, Spring
+from shaftwork.components.mechanics import Inertia, Spring
 from shaftwork.equations.spelling import ACCENTED, chosen_subscript, escaped, in_text
-from shaftwork.network.builder import NetworkBuilder
+from shaftwork.network.netlist import NetworkBuilder
 from tests.equations.networks import equations_of
 from tests.equations.test_latex import compile_latex, compiles, overfull, symbols
 

@@ -25,7 +25,8 @@ from types import FrameType
 
 import shaftwork as sw
 from shaftwork.cli import DONE, FAILED, WRONG_INPUT, main
-from shaftwork.network.expressions import parse, write
+from shaftwork.modelfiles.storage import write
+from shaftwork.network.expressions import parse
 from tests.faults.mutations import command_line, extreme_file, law, model_file
 
 SECONDS, AT_WORK = 2.0, 20.0

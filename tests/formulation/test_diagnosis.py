@@ -8,7 +8,7 @@ import pytest
 import sympy
 from hypothesis import given
 
-from shaftwork.components import bldc, electrical, loads, machines, rotation, sources, translation  # noqa: F401 - registers all
+from shaftwork.components import bldc, electrical, loads, mechanics, sources  # noqa: F401 - registers all
 from shaftwork.components.base import REGISTRY
 from shaftwork.components.laws import Ramp, Step, omega, phi, t
 from shaftwork.components.tables import Table

@@ -11,7 +11,7 @@ import pytest
 import sympy
 
 import shaftwork as sw
-from shaftwork.components import electrical, laws, machines, rotation, sources, translation
+from shaftwork.components import electrical, laws, mechanics, sources
 from shaftwork.components.base import Component, Port, component
 from shaftwork.components.branches import ACROSS, AcrossLaw, AcrossStore, Branch, IdealCoupling, ThroughLaw
 from shaftwork.core.errors import Diagnostic
@@ -19,12 +19,11 @@ from shaftwork.core.parameters import parameter
 from shaftwork.network.checks import connection_problems, examine
 from shaftwork.network.grammar import FUNCTIONS
 from shaftwork.network.graph import build_graph
-from shaftwork.network.netlist import Netlist, Placed
-from shaftwork.network.wording import Spelling
+from shaftwork.network.netlist import Netlist, Placed, Spelling
 
-ROTOR = Placed(rotation.Inertia("J1", J=1.0), ("rotor",))
-SHAFT = Placed(rotation.Spring("shaft", c=1e3, d=1.0), ("rotor", "wheel"))
-WHEEL = Placed(rotation.Inertia("J2", J=1.0), ("wheel",))
+ROTOR = Placed(mechanics.Inertia("J1", J=1.0), ("rotor",))
+SHAFT = Placed(mechanics.Spring("shaft", c=1e3, d=1.0), ("rotor", "wheel"))
+WHEEL = Placed(mechanics.Inertia("J2", J=1.0), ("wheel",))
 TRAIN = (ROTOR, SHAFT, WHEEL)
 
 
@@ -59,7 +58,7 @@ def test_a_network_without_parts_is_said_to_be_empty() -> None:
 
 
 def test_equal_names_are_said_with_both_places() -> None:
-    problem = typed(rotation.Damper("shaft", d=1.0), "wheel")
+    problem = typed(mechanics.Damper("shaft", d=1.0), "wheel")
     assert problem.message == "Damper 'shaft' at node 'wheel' has the name of Spring 'shaft' at nodes 'rotor', 'wheel'."
     assert "'shaft_2'" in problem.hint
     assert (problem.kind, problem.parts, problem.nodes) == ("duplicate name", ("shaft",), ("wheel",))
@@ -77,7 +76,7 @@ def test_equal_names_are_said_with_both_places() -> None:
     ],
 )
 def test_a_part_that_cannot_be_named_is_said(name: str, words: str) -> None:
-    problem = typed(rotation.Inertia(name, J=1.0), "wheel")
+    problem = typed(mechanics.Inertia(name, J=1.0), "wheel")
     assert problem.kind == "part name"
     assert words in problem.message
 
@@ -86,21 +85,21 @@ def test_a_part_that_cannot_be_named_is_said(name: str, words: str) -> None:
     ("node", "kind"), [("", "node name"), (3, "node name"), ("a\nb", "node name"), ("J1.b", "dotted node name")]
 )
 def test_a_node_that_cannot_be_named_is_said(node: Any, kind: str) -> None:
-    problem = typed(rotation.Inertia("J3", J=1.0), node)
+    problem = typed(mechanics.Inertia("J3", J=1.0), node)
     assert problem.kind == kind
     assert "Inertia 'J3'" in problem.message
 
 
 @pytest.mark.parametrize("nodes", [("rotor",), ("rotor", "wheel", "one more"), ()])
 def test_a_wrong_number_of_nodes_is_said_with_the_ports(nodes: tuple[str, ...]) -> None:
-    problem = typed(rotation.Gear("g", ratio=2.0), *nodes)
+    problem = typed(mechanics.Gear("g", ratio=2.0), *nodes)
     assert problem.kind == "node count"
     assert problem.message.endswith("but its ports are: a, b.")
     assert problem.hint == "Write net.add(part, 'node a', 'node b')."
 
 
 def test_an_optional_port_may_be_left_out() -> None:
-    assert typed_problems(netlist((rotation.Damper("bearing", d=1.0), ("rotor",)))) == ()
+    assert typed_problems(netlist((mechanics.Damper("bearing", d=1.0), ("rotor",)))) == ()
 
 
 def test_a_node_of_another_domain_is_said_with_the_part_that_came_first() -> None:
@@ -112,9 +111,9 @@ def test_a_node_of_another_domain_is_said_with_the_part_that_came_first() -> Non
 @pytest.mark.parametrize(
     ("part", "nodes"),
     [
-        (rotation.Spring("s", c=1.0), ("rotor", "rotor")),
-        (rotation.Damper("d", d=1.0), ("ground",)),
-        (rotation.Inertia("J3", J=1.0), ("ground",)),
+        (mechanics.Spring("s", c=1.0), ("rotor", "rotor")),
+        (mechanics.Damper("d", d=1.0), ("ground",)),
+        (mechanics.Inertia("J3", J=1.0), ("ground",)),
         (electrical.VoltageSource("u", u=1.0), ("ground", "ground")),
     ],
 )
@@ -126,7 +125,7 @@ def test_a_part_with_all_ends_at_one_node_does_nothing(part: Component, nodes: t
 
 
 def test_a_machine_with_its_terminals_joined_is_allowed() -> None:
-    assert typed_problems(netlist((machines.DCMachine("m", k=1.0, R=1.0), ("ground", "ground", "rotor")))) == ()
+    assert typed_problems(netlist((electrical.DCMachine("m", k=1.0, R=1.0), ("ground", "ground", "rotor")))) == ()
 
 
 @pytest.mark.parametrize(
@@ -143,7 +142,7 @@ def test_a_machine_with_its_terminals_joined_is_allowed() -> None:
     ],
 )
 def test_a_bad_value_is_said_with_unit_and_bounds(value: Any, words: str) -> None:
-    problem = typed(rotation.Inertia("J3", J=value), "wheel")
+    problem = typed(mechanics.Inertia("J3", J=value), "wheel")
     assert words in problem.message
     assert (problem.kind, problem.hint) == (
         "parameter",
@@ -154,7 +153,7 @@ def test_a_bad_value_is_said_with_unit_and_bounds(value: Any, words: str) -> Non
 
 @pytest.mark.slow
 def test_a_wrong_unit_is_said_with_the_right_one() -> None:
-    problem = typed(rotation.Inertia("J3", J=3 * pint.UnitRegistry().meter), "wheel")  # type: ignore[arg-type]
+    problem = typed(mechanics.Inertia("J3", J=3 * pint.UnitRegistry().meter), "wheel")  # type: ignore[arg-type]
     assert problem.kind == "wrong unit"
     assert "is given in 'meter', but needs kg*m^2" in problem.message
 
@@ -292,8 +291,8 @@ def test_a_branch_takes_plain_numbers(number: Any) -> None:
 
 def test_all_slips_are_reported_together_and_the_rest_can_be_assembled() -> None:
     broken = netlist(
-        (rotation.Inertia("J1", J=float("nan")), ("wheel",)),
-        (rotation.Gear("g", ratio=0.0), ("rotor", "out", "more")),
+        (mechanics.Inertia("J1", J=float("nan")), ("wheel",)),
+        (mechanics.Gear("g", ratio=0.0), ("rotor", "out", "more")),
         (sources.TorqueSource("motor", tau=laws.v), ("rotor",)),
         (electrical.Resistor("R", R=-1.0), ("rotor", "ground")),
     )
@@ -305,19 +304,19 @@ def test_all_slips_are_reported_together_and_the_rest_can_be_assembled() -> None
 
 
 def test_a_loose_end_is_said_with_the_node_that_may_be_meant() -> None:
-    (problem,) = joined((rotation.Spring("line", c=1.0), ("rotor", "whel")))
+    (problem,) = joined((mechanics.Spring("line", c=1.0), ("rotor", "whel")))
     assert problem.message == "node 'whel': only Spring 'line' ends there, with its port b, so it can carry no load."
     assert problem.hint == "Join another part to 'whel' (did you mean node 'wheel'?), or remove 'line'."
     assert (problem.kind, problem.parts, problem.nodes) == ("loose end", ("line",), ("whel",))
 
 
 def test_the_third_port_of_a_planetary_gear_is_a_loose_end() -> None:
-    (problem,) = joined((rotation.PlanetaryGear("p", ratio=2.0), ("rotor", "wheel", "ring")))
+    (problem,) = joined((mechanics.PlanetaryGear("p", ratio=2.0), ("rotor", "wheel", "ring")))
     assert "only PlanetaryGear 'p' ends there, with its port ring" in problem.message
 
 
 def test_a_floating_part_is_said_once() -> None:
-    (problem,) = joined((rotation.Spring("adrift", c=1.0), ("x", "y")))
+    (problem,) = joined((mechanics.Spring("adrift", c=1.0), ("x", "y")))
     assert problem.message == "Spring 'adrift' at nodes 'x', 'y' shares no node with any other part."
     assert (problem.kind, problem.parts, problem.nodes) == ("floating part", ("adrift",), ("x", "y"))
 
@@ -325,10 +324,10 @@ def test_a_floating_part_is_said_once() -> None:
 @pytest.mark.parametrize(
     ("part", "nodes"),
     [
-        (rotation.Damper("d", d=1.0), ("x",)),
-        (rotation.Ground("wall"), ("x",)),
+        (mechanics.Damper("d", d=1.0), ("x",)),
+        (mechanics.Ground("wall"), ("x",)),
         (sources.SpeedSource("w", omega=1.0), ("x",)),
-        (machines.DCMachine("m", k=1.0, R=1.0), ("x", "y", "z")),
+        (electrical.DCMachine("m", k=1.0, R=1.0), ("x", "y", "z")),
     ],
 )
 def test_a_part_alone_at_its_nodes_floats(part: Component, nodes: tuple[str, ...]) -> None:
@@ -336,8 +335,8 @@ def test_a_part_alone_at_its_nodes_floats(part: Component, nodes: tuple[str, ...
 
 
 def test_two_trains_in_one_network_are_a_note() -> None:
-    brake = translation.TranslationalDamper("d", d=1.0)
-    (problem,) = joined((translation.Mass("m1", m=1.0), ("car",)), (brake, ("car",)))
+    brake = mechanics.TranslationalDamper("d", d=1.0)
+    (problem,) = joined((mechanics.Mass("m1", m=1.0), ("car",)), (brake, ("car",)))
     assert problem.message == "'m1', 'd' at node 'car' share no node with 'J1', 'shaft', 'J2'."
     assert (problem.kind, problem.severity) == ("separate train", "note")
 

@@ -18,8 +18,9 @@ from hypothesis import strategies as st
 from shaftwork.components.laws import SYMBOLS, Ramp, Step, omega, phi, t, v
 from shaftwork.components.tables import Table
 from shaftwork.core.errors import ModelFileError
+from shaftwork.modelfiles.storage import write
 from shaftwork.network import grammar
-from shaftwork.network.expressions import parse, write
+from shaftwork.network.expressions import parse
 
 MOTOR = Table([0.0, 100.0, 314.0], [20.0, 31.5, 0.0])
 

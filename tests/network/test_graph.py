@@ -14,7 +14,7 @@ import sympy
 import shaftwork as sw
 from shaftwork.components.shaft_models import ShaftModel
 from shaftwork.core.domains import ROTATION
-from shaftwork.network.sharing import Shared
+from shaftwork.network.templates import Shared
 
 
 def hoist(**shaft: float) -> sw.Network:

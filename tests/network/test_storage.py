@@ -75,8 +75,8 @@ def test_a_law_without_symbols_comes_back_as_its_number(law: sympy.Expr, tmp_pat
     net.add(sw.TorqueSource("T", tau=law), "a")
     net.save(tmp_path / "constant.toml")
     loaded = sw.Network.load(tmp_path / "constant.toml")
-    assert [resolve(placed)[0].values for placed in loaded.netlist().placed] == [
-        resolve(placed)[0].values for placed in net.netlist().placed
+    assert [resolve(placed.part)[0] for placed in loaded.netlist().placed] == [
+        resolve(placed.part)[0] for placed in net.netlist().placed
     ]
     assert [type(value) for part in loaded.parts for value in part.values.values()] == [float, float]
 

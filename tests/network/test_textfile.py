@@ -191,7 +191,7 @@ def test_any_text_is_a_model_or_a_named_error(words: list[str]) -> None:
     assert tomllib.loads(PART + "".join(words))["format"] == 1
 
 
-FULL = textfile.MAXIMUM_SIZE - 200
+FULL = textfile.LARGEST_FILE - 200
 HOSTILE = {
     "nested lists": "a = " + "[" * FULL,
     "a dotted key": ".".join("a" * (FULL // 2)) + " = 1",
@@ -206,7 +206,7 @@ HOSTILE = {
     "empty parts": HEAD + "[[part]]\n" * (FULL // 9),
     "comments": HEAD + "#\n" * (FULL // 2),
     "many keys": PART + "\n".join(f"a{i} = 1" for i in range(FULL // 12)) + "\na0 = 1",
-    "too large": "#" * (textfile.MAXIMUM_SIZE + 1),
+    "too large": "#" * (textfile.LARGEST_FILE + 1),
 }
 
 
@@ -261,7 +261,7 @@ def test_a_file_that_is_too_large_or_no_utf8_is_named(tmp_path: Path) -> None:
     path.write_bytes(b'format = 1\nname = "\xff"')
     with pytest.raises(ModelFileError, match="line 2: is not UTF-8"):
         read(path)
-    path.write_bytes(b"#" * (textfile.MAXIMUM_SIZE + 1))
+    path.write_bytes(b"#" * (textfile.LARGEST_FILE + 1))
     with pytest.raises(ModelFileError, match="has more than"):
         read(path)
     path.write_bytes(b"")

@@ -244,7 +244,7 @@ def test_modes_that_say_the_same_have_the_same_equations(name: str) -> None:
     groups: dict[tuple[str, str], set[object]] = {}
     for label, mode in ((element.label, mode) for element in part.modes for mode in element.options):
         made = make_template(
-            part.component, resolve(placed)[0].values, (ModeChoice(mode.form, mode.value),) * len(part.modes)
+            part.component, resolve(placed.part)[0], (ModeChoice(mode.form, mode.value),) * len(part.modes)
         )
         laws = tuple((b.kind, b.law, b.ends, b.terms, b.through) for b in made.branches)
         groups.setdefault((label, mode.words), set()).add(laws)

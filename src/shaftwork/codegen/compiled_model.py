@@ -20,8 +20,8 @@ from shaftwork.codegen.code import branchwise, scalar
 from shaftwork.codegen.runs import MachineCode, RunProgram
 from shaftwork.components.discontinuities import pieces_degree
 from shaftwork.components.laws import t as TIME
+from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import CompileError, MissingExtraError, ParameterError
-from shaftwork.core.kept import Kept
 from shaftwork.core.parameters import in_si, is_quantity, without_unit
 from shaftwork.formulation.explicit_rows import BlockTooLargeError, Rows, explicit_rows
 from shaftwork.formulation.form import StateForm
@@ -125,7 +125,7 @@ class CompiledModel:
         self.parameters: Mapping[str, float] = MappingProxyType(dict(form.graph.parameters))
         self.arrays = ArrayProgram(form)
         self.defaults = np.array(list(self.parameters.values()), dtype=float)
-        self._bound = Kept[bytes, BoundArrays](1)
+        self._bound = BoundedCache[bytes, BoundArrays](1)
         self._machine: MachineCode | None = None
 
     @cached_property

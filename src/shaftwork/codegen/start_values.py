@@ -17,7 +17,7 @@ from shaftwork.codegen.array_form.recovery import BranchHistory
 from shaftwork.codegen.operating import AT_ONCE, energy_weights
 from shaftwork.codegen.start_names import StartNames, speeds_inside
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.times import just_after
+from shaftwork.numerics.zeros import just_after
 
 
 def initial_state(bound: BoundArrays, given: Mapping[str, float], t0: float) -> Array:

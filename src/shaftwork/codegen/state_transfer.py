@@ -31,8 +31,8 @@ from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import ROUNDING, SAME, Array
 from shaftwork.codegen.array_form.matrices import LinearPart
 from shaftwork.codegen.array_form.recovery import BranchHistory
+from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import CompileError
-from shaftwork.core.kept import Kept
 from shaftwork.formulation.form import StateForm, store_name
 from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind
@@ -58,7 +58,10 @@ class StateTransfer:
         self.through = tuple(name for name, template in templates if template.kind is Kind.THROUGH_STORE)
         """Those of the names that are torques of springs or currents of inductors."""
         self._states = [state.name for state in form.states]
-        self._to_stores, self._to_states = Kept[LinearPart, Array](1), Kept[LinearPart, tuple[Array, Array]](1)
+        self._to_stores, self._to_states = (
+            BoundedCache[LinearPart, Array](1),
+            BoundedCache[LinearPart, tuple[Array, Array]](1),
+        )
 
     @cached_property
     def _columns(self) -> list[int]:

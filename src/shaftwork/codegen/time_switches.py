@@ -27,8 +27,8 @@ from shaftwork.codegen.timeline import (
 )
 from shaftwork.components.discontinuities import line, narrow_places, switches, unsolved_places
 from shaftwork.components.laws import t as TIME
+from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.kept import Kept
 from shaftwork.formulation.form import StateForm
 from shaftwork.network.graph import GraphPart
 from shaftwork.network.kinds import Kind
@@ -143,7 +143,7 @@ class Switching:
         self._unsolved = tuple(_unsolved(form))
         every = (*self._switches, *self._narrow, *self._unsolved)
         self._places = sorted({place for one in every for place in one.places})
-        self._timelines = Kept[tuple[bytes, float, float, bool], Timeline](8)
+        self._timelines = BoundedCache[tuple[bytes, float, float, bool], Timeline](8)
 
     def known(self, p: Array) -> tuple[float, ...]:
         """Times in s of switches that are linear in time, increasing: they are known without a run.

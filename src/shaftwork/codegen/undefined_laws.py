@@ -17,8 +17,8 @@ from shaftwork.components.tables import Table
 from shaftwork.core.errors import SimulationError, no_value
 from shaftwork.formulation.form import StateForm
 from shaftwork.network.graph import GraphPart
+from shaftwork.network.netlist import title
 from shaftwork.network.templates import substitution
-from shaftwork.network.wording import title
 from shaftwork.numerics.zeros import LOOKS, zero
 
 LONGEST = 60

@@ -8,20 +8,17 @@ from shaftwork.components.base import REGISTRY, Component, Port, Signal, compone
 from shaftwork.components.tables import Table
 
 FAMILIES = (
-    "rotation",
+    "mechanics",
     "contacts",
     "friction",
     "shafts",
-    "translation",
     "sources",
     "loads",
     "bucket_wheel",
     "motors",
     "drives",
-    "controllers",
-    "machines",
-    "bldc",
     "electrical",
+    "bldc",
 )
 """The modules of components, in the order in which they are shown."""
 for family in FAMILIES:

@@ -257,7 +257,11 @@ def component(cls: type[C]) -> type[C]:
     """
     _refuse_wrong_class(cls)
     kind = dataclass(frozen=True)(cls)
-    fields = [field for field in dataclasses.fields(kind) if field.name not in ("name", "symbol")]
+    shared = _declared_by_bases(cls)  # they come last, as what a part has in common with others
+    fields = sorted(
+        (field for field in dataclasses.fields(kind) if field.name not in ("name", "symbol")),
+        key=lambda field: field.name in shared,
+    )
     if bare := [field.name for field in fields if "declare" not in field.metadata]:
         raise ShaftworkError(
             f"{cls.__name__}: {bare[0]} is not declared. Write {bare[0]}: float = parameter('unit', 'meaning'), or "
@@ -268,6 +272,12 @@ def component(cls: type[C]) -> type[C]:
     _explain_wrong_arguments(kind)
     REGISTRY[kind.__name__] = kind
     return kind
+
+
+def _declared_by_bases(cls: type[Component]) -> frozenset[str]:
+    """The parameters that the base classes of a component declare which are dataclasses, but no components."""
+    bases = (base for base in cls.__mro__[1:] if "__dataclass_fields__" in vars(base) and "declared" not in vars(base))
+    return frozenset(name for base in bases for name in vars(base)["__annotations__"])
 
 
 def _refuse_wrong_class(cls: type[Component]) -> None:
@@ -365,3 +375,25 @@ def number_of(part: Component, name: str) -> float | None:
     """A parameter in SI, None where it is left out or is no admissible number, which the checks of a network report."""
     value, objection = part.declared[name].magnitude(getattr(part, name))
     return value if objection is None and isinstance(value, float) else None
+
+
+def refuse_no_time_on(part: Component, does: str = "gives torque") -> None:
+    """Refuse times between which a part never does anything.
+
+    Args:
+        part: with `t_on` and `t_off`.
+        does: what it then never does.
+
+    Raises:
+        ParameterError: `t_off` is not later than `t_on`.
+    """
+    start, end = number_of(part, "t_on"), number_of(part, "t_off")
+    if start is not None and end is not None and end <= start:
+        twice = (
+            f" Where it is to be on up to {end:g} s and again from {start:g} s, give two parts: one with "
+            f"t_off = {end:g} alone, one with t_on = {start:g} alone."
+        )
+        raise ParameterError(
+            f"{type(part).__name__} '{part.name}': t_off = {end:g} s is not later than t_on = {start:g} s, so that it "
+            f"never {does}. Give t_off > t_on, or leave one of them out.{twice if 0 < end < start else ''}"
+        )

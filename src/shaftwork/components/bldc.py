@@ -21,9 +21,8 @@ from shaftwork.components.branches import (
     integral_of,
     through_of,
 )
-from shaftwork.components.clips import larger, no_less, smaller
-from shaftwork.components.laws import PWM, as_expression
-from shaftwork.components.machines import ROTOR
+from shaftwork.components.electrical import ROTOR
+from shaftwork.components.laws import PWM, as_expression, larger, no_less, smaller
 from shaftwork.components.modes import ANEW, Leave, Mode, Modes
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import ParameterError

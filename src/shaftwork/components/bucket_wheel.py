@@ -116,10 +116,16 @@ class BucketWheelLoad(Component):
 
     @property
     def mean_torque(self) -> float:
-        """Mean over many passes in N m, at the wheel: radius edge k_1 buckets (2 + alpha - pi/2) / (4 pi)."""
-        radius, edge, alpha = (
-            self.declared[name].magnitude(getattr(self, name))[0] for name in ("radius", "edge", "alpha")
-        )
+        """Mean over many passes in N m, at the wheel: radius edge k_1 buckets (2 + alpha - pi/2) / (4 pi).
+
+        Raises:
+            ParameterError: radius, edge or alpha is not admissible.
+        """
+        names = ("radius", "edge", "alpha")
+        for name in names:
+            if (objection := self.declared[name].magnitude(getattr(self, name))[1]) is not None:
+                raise ParameterError(f"BucketWheelLoad '{self.name}': {name} = {getattr(self, name)!r} {objection}.")
+        radius, edge, alpha = (self.declared[name].magnitude(getattr(self, name))[0] for name in names)
         mean = Soil.read(self.soil).mean if isinstance(self.soil, str) else self.soil.mean
         return float(radius * edge * mean * Buckets.read(self.buckets) * (2 + alpha - math.pi / 2) / (4 * math.pi))
 

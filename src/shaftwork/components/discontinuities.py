@@ -14,17 +14,12 @@ import sympy
 from sympy.core.relational import Relational
 
 from shaftwork.components.branches import ACROSS, INTEGRAL, readings_in
-from shaftwork.components.law_slopes import complement, is_root, square_root
+from shaftwork.components.law_slopes import MOST_DEGREE, complement, is_root, square_root
 from shaftwork.components.laws import SYMBOLS, t
 from shaftwork.components.noise import SmoothNoise
 from shaftwork.components.tables import TABLE_FUNCTIONS, Interpolation, InterpolationSlope
 
-MOST_POWER = 8
-"""Pulses of higher powers of time, and powers of such, are not looked for."""
-EDGES = (
-    *(sympy.exp, sympy.sinh, sympy.cosh, sympy.tanh, sympy.coth, sympy.sech, sympy.csch),
-    *(sympy.erf, sympy.erfc, sympy.atan, sympy.Pow),
-)
+EDGES = (sympy.exp, sympy.sinh, sympy.cosh, sympy.tanh, sympy.atan, sympy.Pow)
 """Functions that rise or fall in a small part of their argument's range; powers, where it or a fraction is in them."""
 FLANK = (-24.0, -8.0, -2.0, -0.5)
 """Exponents at which steps end on the flank of a bell: e^-24 is below every tolerance, and the last is near the top."""
@@ -75,10 +70,8 @@ def switches_of(node: sympy.Basic) -> Iterable[tuple[sympy.Expr, Sequence[float]
             return [(first - second, (0.0,)) for first, second in combinations(node.args, 2)]
         case sympy.atan2():
             return [(node.args[0], (0.0,))]
-        case sympy.tan() | sympy.sec():
+        case sympy.tan():
             return [(sympy.cos(node.args[0]), (0.0,))]
-        case sympy.cot() | sympy.csc():
-            return [(sympy.sin(node.args[0]), (0.0,))]
         case sympy.asin() | sympy.acos() if (corner := complement(node)) is not None:
             return [(corner, (0.0,))]  # of asin(sin(x)), a triangular wave, cos(x)
         case sympy.Pow() if is_root(node) and (root := square_root(node.base)) is not None:
@@ -118,7 +111,7 @@ def unsolved_places(expression: sympy.Basic, symbols: Iterable[sympy.Symbol]) ->
     nodes = sympy.preorder_traversal(expression)
     for node in nodes:
         if isinstance(node, EDGES) and node.has(t) and node.free_symbols <= {t, *symbols}:
-            whole = isinstance(node, sympy.Pow) and node.exp.is_Integer and 0 < node.exp <= MOST_POWER
+            whole = isinstance(node, sympy.Pow) and node.exp.is_Integer and 0 < node.exp <= MOST_DEGREE
             argument, _ = _inside(node)
             if not whole and not (argument.has(t) and _is_simple(argument)):
                 nodes.skip()
@@ -144,7 +137,7 @@ def _is_simple(argument: sympy.Expr) -> bool:
     sines = {wave: sympy.Dummy() for wave in waves}
     plain, moving = argument.xreplace(sines), (t, *sines.values())
     powers = [power.exp for power in plain.atoms(sympy.Pow) if power.has(*moving)]
-    return all(power.is_Integer and 0 < power <= MOST_POWER for power in powers) and plain.is_polynomial(*moving)
+    return all(power.is_Integer and 0 < power <= MOST_DEGREE for power in powers) and plain.is_polynomial(*moving)
 
 
 def bells(expression: sympy.Basic, symbols: Sequence[sympy.Symbol]) -> Iterator[tuple[sympy.Expr, tuple[float, ...]]]:

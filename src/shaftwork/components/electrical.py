@@ -1,27 +1,31 @@
-"""Electrical parts, as far as motors and their supplies need them."""
+"""Electrical parts, as far as motors and their supplies need them, and machines as circuits."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
-from sympy import And, Heaviside, Not
+from sympy import And, Expr, Heaviside, Integer, Not, Piecewise, Rational, cos, pi, sin, sqrt
 
-from shaftwork.components.base import Component, Port, Role, component
+from shaftwork.components.base import Component, Port, Role, Signal, component, refuse_no_time_on
 from shaftwork.components.branches import (
     ACROSS,
     INTEGRAL,
     AcrossLaw,
     AcrossStore,
     Branch,
+    IdealCoupling,
     ThroughLaw,
     ThroughStore,
+    across_of,
     rigid,
+    through_of,
 )
-from shaftwork.components.friction import STUCK, conducting
+from shaftwork.components.friction import STUCK, conducting, ends, is_past, onset
+from shaftwork.components.laws import t
 from shaftwork.components.modes import ANEW, Leave, Mode, Modes
-from shaftwork.components.timing import ends, is_past, onset, refuse_no_time_on
-from shaftwork.core.domains import ELECTRICAL
+from shaftwork.components.motors import on_time
+from shaftwork.core.domains import ELECTRICAL, ROTATION
 from shaftwork.core.parameters import parameter
 
 TERMINALS = (Port("p", ELECTRICAL), Port("n", ELECTRICAL))
@@ -149,3 +153,109 @@ class Diode(Component):
     def branches(self, p: Any) -> Iterator[Branch]:
         if p.form == STUCK:
             yield rigid(("p", "n"))
+
+
+ROTOR = {
+    "omega": Signal("across", ("rotor", None), ROTATION),
+    "tau": Signal("through", ("rotor", None), ROTATION, -1),
+}
+"""Speed of the rotor, and the torque that the machine gives to it."""
+AXES = ("alpha", "beta")
+PHASES = Rational(3, 2)
+"""How many phases an axis stands for."""
+
+
+@component
+class DCMachine(Component):
+    """A direct-current machine: armature circuit between p and n, rotor (without inertia) at node rotor.
+
+    Law: u = k omega + R i + L di/dt, tau = k i; k is both the torque constant and the back-EMF constant.
+    Analogue: an ideal transformer between the electrical and the rotational domain.
+    """
+
+    k: float = parameter("N*m/A", "torque constant, equal to the back-EMF constant in V*s/rad", nonzero=True)
+    R: float = parameter("ohm", "armature resistance", at_least=0, default=0.0)
+    L: float = parameter("H", "armature inductance", at_least=0, default=0.0)
+
+    role: ClassVar[Role] = "coupling"
+    ports: ClassVar = (Port("p", ELECTRICAL), Port("n", ELECTRICAL), Port("rotor", ROTATION))
+    inner: ClassVar = (Port("resistor", ELECTRICAL), Port("emf", ELECTRICAL))
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        yield ThroughLaw(ACROSS / p.R, ("p", "resistor"))
+        yield ThroughStore(1 / p.L, ("resistor", "emf"))
+        yield IdealCoupling(((Integer(1), "emf", "n"), (-p.k, "rotor", None)))
+
+    def signals(self) -> dict[str, Signal]:
+        """Voltage and current of the armature, speed of the rotor and torque that the machine gives to it."""
+        return {
+            "u": Signal("across", ("p", "n"), ELECTRICAL),
+            "i": Signal("through", ("p", None), ELECTRICAL),
+            **ROTOR,
+        }
+
+
+@component
+class InductionMachine(Component):
+    """A three-phase induction machine at a balanced sinusoidal supply, in stationary axes alpha and beta.
+
+    Law: in each axis u = R_s i + d psi_s/dt, 0 = R_r i_r + d psi_r/dt - j p omega psi_r with alpha + j beta,
+    psi_s = L_s_sigma i + L_m (i + i_r), psi_r = L_r_sigma i_r + L_m (i + i_r), and
+    tau = 3/2 p L_m (i_m_alpha i_beta - i_m_beta i_alpha) with i_m = i + i_r. From t_on the phase voltage is
+    sqrt(2/3) U (cos, sin)(2 pi f t); before it the windings are short-circuited. Rotor quantities are referred to the
+    stator. Source: Park 1929; the axes are those of Clarke 1943, with the amplitude kept: i_alpha is the current of
+    phase a. In the circuit an axis has 3/2 times the impedance and voltage of a phase, so that its power is that of the
+    machine. With R_s = 0 its steady torque is exactly Kloss' curve.
+    Analogue: a transformer whose secondary carries a back EMF.
+    """
+
+    U: float = parameter("V", "voltage between two lines, effective", above=0)
+    f: float = parameter("Hz", "frequency of the supply", above=0)
+    L_m: float = parameter("H", "magnetising inductance", above=0)
+    L_s_sigma: float = parameter("H", "leakage inductance of the stator", above=0, latex=r"L_{s\sigma}")
+    L_r_sigma: float = parameter("H", "leakage inductance of the rotor", at_least=0, latex=r"L_{r\sigma}")
+    R_r: float = parameter("ohm", "rotor resistance", above=0)
+    R_s: float = parameter("ohm", "stator resistance", at_least=0, default=0.0)
+    pole_pairs: float = parameter("1", "number of pole pairs", above=0, whole=True, default=1.0, latex="p")
+    t_on: float | None = on_time()
+
+    role: ClassVar[Role] = "source"
+    ports: ClassVar = (Port("rotor"),)
+    inner: ClassVar = tuple(
+        Port(f"{place}_{axis}", ELECTRICAL) for axis in AXES for place in ("supply", "stator", "gap", "rotor", "emf")
+    )
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        speed, linked = p.pole_pairs * across_of("rotor"), {axis: _rotor_flux(p, axis) for axis in AXES}
+        phase = 2 * pi * p.f * t
+        yield from self._axis(p, "alpha", cos(phase), -speed * linked["beta"])
+        yield from self._axis(p, "beta", sin(phase), speed * linked["alpha"])
+        (i_a, i_b), (m_a, m_b) = ([through_of(f"{name}_{axis}") for axis in AXES] for name in ("i", "i_m"))
+        yield ThroughLaw(-PHASES * p.pole_pairs * p.L_m * (m_a * i_b - m_b * i_a), ("rotor", None), "e")
+
+    def _axis(self, p: Any, axis: str, supply: Expr, emf: Expr) -> Iterator[Branch]:
+        voltage = PHASES * sqrt(Rational(2, 3)) * p.U * supply
+        switched = voltage if p.t_on is None else Piecewise((0, t < p.t_on), (voltage, True))
+        names = ("supply", "stator", "gap", "rotor", "emf")
+        supplied, stator, gap, rotor, moved = (f"{name}_{axis}" for name in names)
+        yield AcrossLaw(switched, (supplied, None), f"u_{axis}")
+        yield ThroughLaw(ACROSS / (PHASES * p.R_s), (supplied, stator), f"R_{axis}")
+        yield AcrossLaw(PHASES * emf, (moved, None), f"u_r_{axis}")
+        yield ThroughLaw(ACROSS / (PHASES * p.R_r), (moved, rotor), f"R_r_{axis}")
+        yield ThroughStore(1 / (PHASES * p.L_r_sigma), (rotor, gap), f"i_r_{axis}")
+        yield ThroughStore(1 / (PHASES * p.L_s_sigma), (stator, gap), f"i_{axis}")
+        yield ThroughStore(1 / (PHASES * p.L_m), (gap, None), f"i_m_{axis}")
+
+    def signals(self) -> dict[str, Signal]:
+        """Speed and torque of the rotor, the currents of the stator, and those that magnetise."""
+        labels = [(f"{name}_{axis}", f"gap_{axis}") for name in ("i", "i_m") for axis in AXES]
+        return {
+            **ROTOR,
+            **{label: Signal("store", (gap, None), ELECTRICAL, 1, label) for label, gap in labels},
+        }
+
+
+def _rotor_flux(p: Any, axis: str) -> Expr:
+    """Flux linkage of the rotor winding in the current of the stator and in that which magnetises."""
+    stator, magnetising = through_of(f"i_{axis}"), through_of(f"i_m_{axis}")
+    return p.L_m * magnetising + p.L_r_sigma * (magnetising - stator)

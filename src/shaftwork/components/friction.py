@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, ClassVar
 
-from sympy import And, Expr, Min, Ne, Not, exp
+from sympy import And, Expr, Min, Ne, Not, exp, false
+from sympy.logic.boolalg import Boolean
 
-from shaftwork.components.base import Component, Port, Role, component, number_of
+from shaftwork.components.base import Component, Port, Role, component, number_of, refuse_no_time_on
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, Branch, End, ThroughLaw, rigid
-from shaftwork.components.clips import no_less
-from shaftwork.components.laws import as_expression, t
+from shaftwork.components.laws import as_expression, no_less, t
 from shaftwork.components.modes import ANEW, Leave, Mode, Modes
-from shaftwork.components.timing import ends, is_past, onset, refuse_no_time_on
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter
 
 SLIPPING, STUCK, HELD = "", "stuck", "held by others"
-# What holds gives way this much above its limit: then there is a torque that moves it, and no rounding of one.
-GIVES_WAY = 1 + 2e-14
+# What holds gives way a hundred roundings above its limit: then there is a torque that moves it.
+GIVES_WAY = 1 + 100 * sys.float_info.epsilon
 
 
 def rubbing(
@@ -104,6 +104,23 @@ class DryFriction(Component):
         yield rubs(p.mode * (p.tau_s if p.form == HELD else slides), p)
         if p.form != STUCK:
             yield ThroughLaw(p.d * ACROSS)
+
+
+def onset(p: Any, on: Expr | None) -> Expr:
+    """Rises above zero when a part comes on: at `p.t_on`, or with a law when that is above zero after `p.t_on`."""
+    if on is None:
+        return t - p.t_on
+    return on if p.t_on == 0 else Min(t - p.t_on, on)
+
+
+def is_past(p: Any) -> Boolean:
+    """Whether a part is off for good, from `p.t_off` on."""
+    return false if p.t_off is None else t >= p.t_off
+
+
+def ends(p: Any, mode: str) -> tuple[Leave, ...]:
+    """What leads to the mode of a part that is off for good."""
+    return () if p.t_off is None else (Leave(t - p.t_off, mode),)
 
 
 @component

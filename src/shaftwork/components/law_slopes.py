@@ -24,21 +24,14 @@ from sympy import (
     Rational,
     Symbol,
     acos,
-    acot,
-    acsc,
-    asec,
     asin,
     atan,
     atan2,
-    ceiling,
     cos,
     cosh,
-    cot,
-    csc,
     expand_trig,
     floor,
     preorder_traversal,
-    sec,
     sign,
     sin,
     sinh,
@@ -50,14 +43,13 @@ from sympy.core.relational import Relational
 from sympy.polys.polyerrors import BasePolynomialError
 from sympy.simplify.fu import TR8
 
-from shaftwork.components.clips import replaced
+from shaftwork.components.laws import replaced
 from shaftwork.components.tables import InterpolationSlope
 
-STEPS = (sign, Heaviside, Relational, InterpolationSlope, floor, ceiling)
+STEPS = (sign, Heaviside, Relational, InterpolationSlope, floor)
 """What is constant but for jumps."""
-TURNING = (sin, cos, tan, cot, sec, csc)
 MOST_SYMBOLS, MOST_DEGREE = 4, 8
-"""Of more symbols, or of a higher degree, a square is not looked for: it would take longer than the run."""
+"""Of more symbols, or of a higher degree, squares and pulses are not looked for: it would take longer than the run."""
 
 
 def wraps(node: Basic) -> bool:
@@ -67,7 +59,7 @@ def wraps(node: Basic) -> bool:
     """
     if isinstance(node, asin | acos) and isinstance(inner := node.args[0], Max | Min):
         return not any(isinstance(part, Max | Min) and part.func is not inner.func for part in inner.args)
-    return isinstance(node, atan2) or (isinstance(node, atan | asin | acos | acot | asec | acsc) and node.has(*TURNING))
+    return isinstance(node, atan2) or (isinstance(node, atan | asin | acos) and node.has(sin, cos, tan))
 
 
 @lru_cache(maxsize=1024)

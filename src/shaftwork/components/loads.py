@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
+from dataclasses import dataclass
 from enum import Enum
 from typing import Any, ClassVar
 
@@ -29,11 +30,14 @@ def rounding(default: float = 0.0) -> Any:
     return parameter("rad/s", meaning, at_least=lowest, default=default, latex=r"\omega_s")
 
 
+@dataclass(frozen=True)
 class Resistance(Component):
     """Base of the loads with a torque against the motion, and perhaps others that have a direction of their own.
 
     Where its parameter `omega_s` is zero it sticks: the node rests until the torque on it is more than `against`.
     """
+
+    omega_s: float = rounding()
 
     role: ClassVar[Role] = "loss"
     ports: ClassVar = (Port("a"),)
@@ -88,7 +92,6 @@ class CoulombLoad(Resistance):
     """
 
     tau: float = parameter("N*m", "size of the resistance", at_least=0, latex=r"\tau_0")
-    omega_s: float = rounding()
 
     def against(self, p: Any, direction: Any) -> Expr:
         return direction * p.tau
@@ -120,7 +123,6 @@ class CraneTravel(Resistance):
     diameter: float = parameter("m", "diameter of the wheels on the rail", above=0, latex="D")
     w: float = parameter("1", "specific resistance of friction, see `wheel_friction`", at_least=0)
     kappa: float = parameter("1", "resistance of wheels that run askew", at_least=0, default=0.0, latex=r"\kappa")
-    omega_s: float = rounding()
 
     def derived(self, p: Any) -> Iterator[Derived]:
         size = p.m * GRAVITY * (p.w + p.kappa) * p.diameter / 2
@@ -167,7 +169,6 @@ class Hoist(Resistance):
     radius: float = parameter("m", "radius of the drum", above=0, latex="r")
     ratio: float = parameter("1", "node speed over drum speed", above=0, default=1.0, latex="i")
     efficiency: float = parameter("1", "efficiency from node to load", above=0, at_most=1, default=1.0, latex=r"\eta")
-    omega_s: float = rounding()
 
     def derived(self, p: Any) -> Iterator[Derived]:
         yield Derived("tau_h", p.m * GRAVITY * p.radius / p.ratio, "N*m", "weight at the shaft", r"\tau_h")
@@ -200,7 +201,6 @@ class FanLoad(RisingResistance):
     tau_n: float = parameter("N*m", "torque at the nominal speed", at_least=0, latex=r"\tau_n")
     n_n: float = parameter("1/min", "nominal speed", above=0)
     static: float = parameter("1", "share of friction in it", at_least=0, at_most=1, default=0.0, latex=r"\sigma")
-    omega_s: float = rounding()
 
 
 @component
@@ -214,7 +214,6 @@ class PumpLoad(RisingResistance):
     tau_n: float = parameter("N*m", "torque at the nominal speed", at_least=0, latex=r"\tau_n")
     n_n: float = parameter("1/min", "nominal speed", above=0)
     static: float = parameter("1", "share of the height in it", at_least=0, at_most=1, default=0.5, latex=r"\sigma")
-    omega_s: float = rounding()
 
 
 @component
@@ -232,7 +231,6 @@ class Conveyor(Resistance):
     friction: float = parameter("1", "coefficient of friction of the idlers", at_least=0, latex=r"\mu")
     incline: float = parameter("rad", "incline of the belt", at_least=-1.57, at_most=1.57, default=0.0, latex=r"\delta")
     d: float = parameter("N*s/m", "drag per belt speed", at_least=0, default=0.0)
-    omega_s: float = rounding()
 
     def against(self, p: Any, direction: Any) -> Expr:
         return direction * p.friction * p.m * GRAVITY * p.radius * cos(p.incline)
@@ -282,7 +280,6 @@ class RandomLoad(Resistance):
     interval: float = parameter("s", "time from one random number to the next", above=0, latex="T")
     seed: float = parameter("1", "any number; other numbers, other noise", default=1.0, latex="z")
     kind: NoiseKind | str = parameter("1", "held or band-limited", default=NoiseKind.HELD, record=NoiseKind)
-    omega_s: float = rounding()
 
     def against(self, p: Any, direction: Any) -> Expr:
         noise = HeldNoise if p.kind is NoiseKind.HELD else SmoothNoise

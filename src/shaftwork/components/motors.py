@@ -4,22 +4,62 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from sympy import Expr, Piecewise, pi, sqrt
+from sympy import Expr, Mul, Piecewise, pi, sqrt
 
-from shaftwork.components.base import Component, Derived, Port, Role, component, number_of
+from shaftwork.components.base import Component, Derived, Port, Role, component, number_of, refuse_no_time_on
 from shaftwork.components.branches import ACROSS, Branch, ThroughLaw
-from shaftwork.components.clips import no_less
+from shaftwork.components.laws import no_less, t
 from shaftwork.components.tables import Interpolation, Table
-from shaftwork.components.timing import off_time, on_time, refuse_no_time_on, while_on
 from shaftwork.core.errors import NetworkWarning, ParameterError
 from shaftwork.core.notices import warn
 from shaftwork.core.parameters import parameter
 
 
+def on_time() -> Any:
+    """Declares `t_on`, the time from which a motor gives torque; None for always."""
+    return parameter("s", "time from which it gives torque", default=None, latex=r"t_{on}")
+
+
+def off_time() -> Any:
+    """Declares `t_off`, the time from which a motor gives none; None for never."""
+    return parameter("s", "time from which it gives none", default=None, latex=r"t_{off}")
+
+
+def while_on(law: Expr, p: Any) -> Expr:
+    """A law from `p.t_on` until `p.t_off`, exactly zero before and after; the law itself where neither is given.
+
+    The cases of a law that has some follow those of the time: equations print one list of them, not one in another.
+    """
+    before = [] if p.t_on is None else [(0, t < p.t_on)]
+    cases = _cases(law)
+    if p.t_off is None:
+        return Piecewise(*before, *cases) if before else law
+    if len(cases) > 1:
+        return Piecewise(*before, (0, t >= p.t_off), *cases)
+    return Piecewise(*before, (law, t < p.t_off), (0, True))
+
+
+def _cases(law: Expr) -> tuple[tuple[Expr, Any], ...]:
+    """The values and conditions of a multiple of a piecewise law; of any other law itself alone."""
+    factors = Mul.make_args(law)
+    pieces = [factor for factor in factors if isinstance(factor, Piecewise)]
+    if len(pieces) != 1:
+        return ((law, True),)
+    others = Mul(*(factor for factor in factors if factor is not pieces[0]))
+    return tuple((others * value, condition) for value, condition in pieces[0].args)
+
+
+@dataclass(frozen=True)
 class CurveMotor(Component):
     """Base of motors by a torque-speed curve, seen through a gear of `ratio` and `efficiency`."""
+
+    ratio: float = parameter("1", "motor speed over node speed", nonzero=True, default=1.0, latex="i")
+    efficiency: float = parameter("1", "efficiency of the gear", above=0, at_most=1, default=1.0, latex=r"\eta")
+    t_on: float | None = on_time()
+    t_off: float | None = off_time()
 
     role: ClassVar[Role] = "source"
     ports: ClassVar = (Port("a"),)
@@ -48,10 +88,6 @@ class KlossMotor(CurveMotor):
     tau_k: float = parameter("N*m", "pull-out torque at the motor shaft", above=0, latex=r"\tau_k")
     s_k: float = parameter("1", "slip at the pull-out torque", above=0)
     n_sync: float = parameter("1/min", "synchronous speed", above=0, latex=r"n_{sync}")
-    ratio: float = parameter("1", "motor speed over node speed", nonzero=True, default=1.0, latex="i")
-    efficiency: float = parameter("1", "efficiency of the gear", above=0, at_most=1, default=1.0, latex=r"\eta")
-    t_on: float | None = on_time()
-    t_off: float | None = off_time()
 
     def torque(self, p: Any) -> Expr:
         return kloss(p.tau_k, _slip(p), p.s_k)
@@ -78,10 +114,6 @@ class CageMotor(CurveMotor):
     n_n: float | None = parameter("1/min", "rated speed", above=0, default=None)
     n_k: float | None = parameter("1/min", "speed at the pull-out torque", above=0, default=None, latex="n_K")
     n_s: float | None = parameter("1/min", "speed at the pull-up torque", above=0, default=None, latex="n_S")
-    ratio: float = parameter("1", "motor speed over node speed", nonzero=True, default=1.0, latex="i")
-    efficiency: float = parameter("1", "efficiency of the gear", above=0, at_most=1, default=1.0, latex=r"\eta")
-    t_on: float | None = on_time()
-    t_off: float | None = off_time()
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -125,10 +157,6 @@ class WoundRotorMotor(CurveMotor):
     resistance: Any = parameter(
         "1", "resistance of the rotor circuit over that of the rotor", at_least=1, law=True, latex="r"
     )
-    ratio: float = parameter("1", "motor speed over node speed", nonzero=True, default=1.0, latex="i")
-    efficiency: float = parameter("1", "efficiency of the gear", above=0, at_most=1, default=1.0, latex=r"\eta")
-    t_on: float | None = on_time()
-    t_off: float | None = off_time()
 
     def torque(self, p: Any) -> Expr:
         return kloss(p.tau_k, _slip(p), p.s_k * no_less(p, "resistance", 1))
@@ -144,10 +172,6 @@ class TableMotor(CurveMotor):
     """
 
     curve: Any = parameter("N*m", "torque over the motor's speed in 1/min: a Table, or one number", law=True)
-    ratio: float = parameter("1", "motor speed over node speed", nonzero=True, default=1.0, latex="i")
-    efficiency: float = parameter("1", "efficiency of the gear", above=0, at_most=1, default=1.0, latex=r"\eta")
-    t_on: float | None = on_time()
-    t_off: float | None = off_time()
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 import sympy
 
-_LAST, _GAMMA = 2**64 - 1, 0x9E3779B97F4A7C15
 _STANDARD = NormalDist()
 
 _ALONG, *_AROUND = sympy.symbols("u, w:4", real=True)
@@ -27,13 +26,15 @@ _WEIGHTS = (
 )
 """Of the four numbers around a place, by the way u from the second to the third: a cubic spline's, not yet scaled."""
 _SQUARES = sympy.expand(sum(weight**2 for weight in _WEIGHTS))
-_FIRST = -1
-"""Number of the first of the four, counted from the whole number below the place."""
+_NEIGHBOURS = range(-1, 3)
+"""Numbers of the four, counted from the whole number below the place."""
 
 
-def _mixed(word: int) -> int:
-    word = (word ^ word >> 30) * 0xBF58476D1CE4E5B9 & _LAST
-    word = (word ^ word >> 27) * 0x94D049BB133111EB & _LAST
+def _split_mix(start: int, number: int) -> int:
+    """A number of the generator SplitMix64, of 64 bits."""
+    word = (start + number * 0x9E3779B97F4A7C15) % 2**64
+    word = (word ^ word >> 30) * 0xBF58476D1CE4E5B9 % 2**64
+    word = (word ^ word >> 27) * 0x94D049BB133111EB % 2**64
     return word ^ word >> 31
 
 
@@ -46,8 +47,7 @@ def normal(number: int, seed: float) -> float:
     """
     # adding zero makes -0.0 and 0.0 one seed
     (bits,) = struct.unpack("<Q", struct.pack("<d", seed + 0.0))
-    start = _mixed(bits + _GAMMA & _LAST)
-    return _STANDARD.inv_cdf(((_mixed(start + number * _GAMMA & _LAST) >> 11) + 0.5) / 2**53)
+    return _STANDARD.inv_cdf(((_split_mix(_split_mix(bits, 1), number) >> 11) + 0.5) / 2**53)
 
 
 def held(x: Any, seed: Any) -> Any:
@@ -73,7 +73,7 @@ def smooth(x: Any, seed: Any, order: Any = 0) -> Any:
     else:
         x = np.where(np.isfinite(x), x, math.nan)
         below = np.floor(x)
-    around = (held(below + k, seed) for k in range(_FIRST, _FIRST + len(_AROUND)))
+    around = (held(below + k, seed) for k in _NEIGHBOURS)
     return _piece(int(order))(x - below, *around)
 
 
@@ -175,7 +175,7 @@ class SmoothNoise(sympy.Function):  # type: ignore[misc]
         x, seed, *orders = self.args
         order = int(orders[0]) if orders else 0
         below = sympy.floor(x)
-        values = {number: HeldNoise(below + k, seed) for k, number in enumerate(_AROUND, _FIRST)}
+        values = {number: HeldNoise(below + k, seed) for k, number in zip(_NEIGHBOURS, _AROUND, strict=True)}
         squares = _nested(_SQUARES)
         piece = _nested(_numerator(order)) / sympy.sqrt(squares) / squares**order
         return piece.xreplace({_ALONG: x - below, **values})

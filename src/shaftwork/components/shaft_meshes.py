@@ -15,10 +15,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from numpy.polynomial.legendre import leggauss
-
-from shaftwork.numerics.polynomials import lobatto_rule, to_slopes
-
 Row = tuple[tuple[int, float], ...]
 
 
@@ -48,36 +44,27 @@ class Mesh:
     first: int = 0
 
 
-def chain(m: int, *, half_ends: bool) -> Mesh:
-    """Springs between m + 1 inertias, with half cells at its ends or all inertias alike."""
-    return Mesh(
-        intervals=m,
-        nodes=tuple(k / m for k in range(m + 1)),
-        inertias=(0.5, *[1.0] * (m - 1), 0.5) if half_ends else (m / (m + 1),) * (m + 1),
-        stations=tuple((k + 0.5) / m for k in range(m)),
-        lengths=(1.0,) * m,
-        weights=tuple(((k, 1.0), (k + 1, -1.0)) for k in range(m)),
-    )
-
-
-# Interior stencils as (offset, factor), and the first rows and norm of the boundary closure, times the interval.
-_SECOND = (((-1, -1 / 2), (1, 1 / 2)), (1 / 2,), ((-1 / 2, 1 / 2),))
-_FOURTH = (
-    ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12)),
-    (17 / 48, 59 / 48, 43 / 48, 49 / 48),
-    (
-        (-1 / 2, 59 / 96, -1 / 12, -1 / 32),
-        (-59 / 96, 0.0, 59 / 96),
-        (1 / 12, -59 / 96, 0.0, 59 / 96, -1 / 12),
-        (1 / 32, 0.0, -59 / 96, 0.0, 2 / 3, -1 / 12),
+SUMMATION_BY_PARTS = {
+    2: (((-1, -1 / 2), (1, 1 / 2)), (1 / 2,), ((-1 / 2, 1 / 2),)),
+    4: (
+        ((-2, 1 / 12), (-1, -2 / 3), (1, 2 / 3), (2, -1 / 12)),
+        (17 / 48, 59 / 48, 43 / 48, 49 / 48),
+        (
+            (-1 / 2, 59 / 96, -1 / 12, -1 / 32),
+            (-59 / 96, 0.0, 59 / 96),
+            (1 / 12, -59 / 96, 0.0, 59 / 96, -1 / 12),
+            (1 / 32, 0.0, -59 / 96, 0.0, 2 / 3, -1 / 12),
+        ),
     ),
-)
-SUMMATION_BY_PARTS = {2: _SECOND, 4: _FOURTH}
-"""By order: stencil, norm and boundary rows. Source: Strand 1994."""
+}
+"""By order: the stencil inside as (offset, factor), the norm and the first rows at an end, times the interval.
+
+Source: Strand 1994.
+"""
 
 
-def central(m: int, order: int, damper: float) -> Mesh:
-    """Speeds and torques at m + 1 nodes, closed by summation by parts; dampers of a given length."""
+def central(m: int, nodes: tuple[float, ...], dampers: tuple[float, ...], order: int) -> Mesh:
+    """Speeds and torques at the same nodes, closed by summation by parts."""
     inside, norm, rows = SUMMATION_BY_PARTS[order]
     shares = [1.0] * (m + 1)
     shares[: len(norm)], shares[m + 1 - len(norm) :] = norm, norm[::-1]
@@ -90,41 +77,22 @@ def central(m: int, order: int, damper: float) -> Mesh:
         else:
             row = [(k + offset, -q) for offset, q in inside]
         weights.append(tuple((j, weight) for j, weight in row if weight))
-    places = tuple(k / m for k in range(m + 1))
-    return Mesh(m, places, tuple(shares), places, tuple(shares), tuple(weights), (damper,) * m)
+    return Mesh(m, nodes, tuple(shares), nodes, tuple(shares), tuple(weights), dampers)
 
 
-def central_as_printed(m: int, damper: float) -> Mesh:
-    """Speeds at m + 1 nodes, torques at the m - 1 between the ends, whose speeds have no inertia of the shaft.
+def central_as_printed(m: int, nodes: tuple[float, ...], dampers: tuple[float, ...]) -> Mesh:
+    """Torques at the m - 1 nodes between the ends, whose speeds have no inertia of the shaft.
 
     The rows of the first and last torque are those that make, transposed, the equations of the speeds as printed.
     """
-    first = ((0, 1.0), (1, -0.5), (2, -0.5))
     inside = (((k - 1, 0.5), (k + 1, -0.5)) for k in range(2, m - 1))
-    last = ((m - 2, 0.5), (m - 1, 0.5), (m, -1.0))
     return Mesh(
         intervals=m,
-        nodes=tuple(k / m for k in range(m + 1)),
+        nodes=nodes,
         inertias=(0.0, *[1.0] * (m - 1), 0.0),
-        stations=tuple(k / m for k in range(1, m)),
+        stations=nodes[1:-1],
         lengths=(1.5, *[1.0] * (m - 3), 1.5),
-        weights=(first, *inside, last),
-        dampers=(damper,) * m,
+        weights=(((0, 1.0), (1, -0.5), (2, -0.5)), *inside, ((m - 2, 0.5), (m - 1, 0.5), (m, -1.0))),
+        dampers=dampers,
         first=1,
-    )
-
-
-def spectral(degree: int) -> Mesh:
-    """Speeds at the nodes of Gauss and Lobatto, torques at those of Gauss."""
-    nodes, inertias = lobatto_rule(degree)
-    stations, lengths = leggauss(degree)
-    # a rigid rotation twists nothing, to the last bit
-    slopes = -to_slopes(nodes, stations) * lengths[:, None]
-    return Mesh(
-        intervals=1,
-        nodes=tuple(((nodes + 1) / 2).tolist()),
-        inertias=tuple((inertias / 2).tolist()),
-        stations=tuple(((stations + 1) / 2).tolist()),
-        lengths=tuple((lengths / 2).tolist()),
-        weights=tuple(tuple(enumerate(row)) for row in slopes.tolist()),
     )

@@ -9,17 +9,12 @@ from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.polynomial.legendre import leggauss
 
-from shaftwork.components.shaft_meshes import (
-    SUMMATION_BY_PARTS,
-    Mesh,
-    central,
-    central_as_printed,
-    chain,
-    spectral,
-)
+from shaftwork.components.shaft_meshes import SUMMATION_BY_PARTS, Mesh, central, central_as_printed
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.parameters import call_in, numbers_in_si, whole
+from shaftwork.core.parameters import call_in, in_si, whole
+from shaftwork.numerics.polynomials import lobatto_rule, to_slopes
 
 MOST_ELEMENTS = 100_000
 """Elements of a model; more is a typing error."""
@@ -50,17 +45,13 @@ class ShaftModel:
             "Lumped(20)."
         )
 
+    @lru_cache(maxsize=32)  # noqa: B019 (of few models, which are small, one for all that are equal)
     def mesh(self) -> Mesh:
         """The nodes, stations and weights."""
-        return _mesh_of(self)
+        return self._mesh()
 
     def _mesh(self) -> Mesh:
         raise ParameterError(f"{self!r} has no mesh.")
-
-
-@lru_cache(maxsize=32)
-def _mesh_of(model: ShaftModel) -> Mesh:
-    return model._mesh()  # noqa: SLF001 (the same class, made once for equal models)
 
 
 @dataclass(frozen=True)
@@ -99,7 +90,15 @@ class Lumped(ShaftModel):
         _one_of(self, "ends", ("half", "full"))
 
     def _mesh(self) -> Mesh:
-        return chain(self.m, half_ends=self.ends == "half")
+        m = self.m
+        return Mesh(
+            intervals=m,
+            nodes=tuple(k / m for k in range(m + 1)),
+            inertias=(0.5, *[1.0] * (m - 1), 0.5) if self.ends == "half" else (m / (m + 1),) * (m + 1),
+            stations=tuple((k + 0.5) / m for k in range(m)),
+            lengths=(1.0,) * m,
+            weights=tuple(((k, 1.0), (k + 1, -1.0)) for k in range(m)),
+        )
 
 
 @dataclass(frozen=True)
@@ -163,14 +162,15 @@ class CentralDifference(ShaftModel):
             raise ParameterError(
                 f"{self!r}: the printed closure is of order 2. Leave order out, or take closure='sbp'."
             )
-        _, norm, _ = SUMMATION_BY_PARTS[self.order]
-        _whole(self, "m", 2 * len(norm) if self.closure == "sbp" else 3, MOST_ELEMENTS)
+        closed = len(SUMMATION_BY_PARTS[self.order][1])
+        _whole(self, "m", 2 * closed if self.closure == "sbp" else 3, MOST_ELEMENTS)
 
     def _mesh(self) -> Mesh:
-        damper = 1.0 if self.second_difference == "consistent" else 2.0
+        dampers = (1.0 if self.second_difference == "consistent" else 2.0,) * self.m
+        nodes = tuple(k / self.m for k in range(self.m + 1))
         if self.closure == "printed":
-            return central_as_printed(self.m, damper)
-        return central(self.m, self.order, damper)
+            return central_as_printed(self.m, nodes, dampers)
+        return central(self.m, nodes, dampers, self.order)
 
 
 @dataclass(frozen=True)
@@ -195,7 +195,18 @@ class Spectral(ShaftModel):
         _whole(self, "n", 1, MOST_SPECTRAL)
 
     def _mesh(self) -> Mesh:
-        return spectral(self.n)
+        nodes, inertias = lobatto_rule(self.n)
+        stations, lengths = leggauss(self.n)
+        # a rigid rotation twists nothing, to the last bit
+        slopes = -to_slopes(nodes, stations) * lengths[:, None]
+        return Mesh(
+            intervals=1,
+            nodes=tuple(((nodes + 1) / 2).tolist()),
+            inertias=tuple((inertias / 2).tolist()),
+            stations=tuple(((stations + 1) / 2).tolist()),
+            lengths=tuple((lengths / 2).tolist()),
+            weights=tuple(tuple(enumerate(row)) for row in slopes.tolist()),
+        )
 
 
 @dataclass(frozen=True)
@@ -240,11 +251,9 @@ class Auto(ShaftModel):
     purpose: ClassVar[str] = "the smallest spectral model that is right up to a frequency"
 
     def __post_init__(self) -> None:
-        for name, least, most in (("f_max", 0.0, 1e12), ("tolerance", 1e-12, 0.1)):
-            value = numbers_in_si(f"Auto: {name}", getattr(self, name), "Hz" if name == "f_max" else "1")
+        for name, unit, least, most in (("f_max", "Hz", 0.0, 1e12), ("tolerance", "1", 1e-12, 0.1)):
+            value = in_si(f"Auto: {name}", getattr(self, name), unit, at_least=least, at_most=most)
             object.__setattr__(self, name, value)
-            if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value <= most:
-                raise ParameterError(f"Auto: {name} = {value!r} must be a number from {least:g} to {most:g}.")
 
     def chosen(self, delay: float) -> Spectral:
         """The model for a shaft that a wave crosses in a delay, s.
@@ -253,13 +262,12 @@ class Auto(ShaftModel):
             ParameterError: the shaft is too long for one polynomial.
         """
         waves = 2 * self.f_max * delay  # half waves along the shaft at the highest frequency
-        degree = _smallest_degree(waves, self.tolerance)
-        if degree is not None:
-            return Spectral(degree)
-        raise ParameterError(
-            f"{self!r} asks for {waves:.0f} half waves along the shaft, more than one polynomial holds. "
-            f"Divide the shaft into several in a row, or lower f_max."
-        )
+        if (degree := _smallest_degree(waves, self.tolerance)) is None:
+            raise ParameterError(
+                f"{self!r} asks for {waves:.0f} half waves along the shaft, more than one polynomial holds. "
+                f"Divide the shaft into several in a row, or lower f_max."
+            )
+        return Spectral(degree)
 
 
 @lru_cache(maxsize=256)
@@ -292,16 +300,13 @@ MODELS: tuple[type[ShaftModel], ...] = (Rigid, OneSpring, Lumped, CentralDiffere
 
 
 def _whole(model: ShaftModel, name: str, least: int, most: int) -> None:
-    value = getattr(model, name)
-    if (count := whole(value, least, most)) is None:
-        raise ParameterError(
-            f"{type(model).__name__}: {name} = {value!r} must be a whole number from {least} to {most}."
-        )
+    if (count := whole(getattr(model, name), least, most)) is None:
+        shown = f"{type(model).__name__}: {name} = {getattr(model, name)!r}"
+        raise ParameterError(f"{shown} must be a whole number from {least} to {most}.")
     object.__setattr__(model, name, count)
 
 
 def _one_of(model: ShaftModel, name: str, choices: tuple[Any, ...]) -> None:
-    value = getattr(model, name)
-    if value not in choices:
-        listed = ", ".join(repr(choice) for choice in choices)
+    if (value := getattr(model, name)) not in choices:
+        listed = ", ".join(map(repr, choices))
         raise ParameterError(f"{type(model).__name__}: {name} = {value!r} must be one of: {listed}.")

@@ -1,13 +1,13 @@
-"""Calls of compiled libraries and of users' functions: Ctrl-C, errors that pass through, and what libraries print."""
+"""Calls from several threads, of compiled libraries and of users: Ctrl-C, errors, prints, and a cache."""
 
 from __future__ import annotations
 
 import contextvars
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
 Result = TypeVar("Result")
 PAUSE = 0.1
@@ -124,3 +124,33 @@ def unprinted() -> Iterator[None]:
                 del _silent[thread]
             if not _silent and isinstance(sys.stdout, _Others):
                 sys.stdout = sys.stdout.stream
+
+
+Key = TypeVar("Key", bound=Hashable)
+Value = TypeVar("Value")
+
+
+class BoundedCache(Generic[Key, Value]):
+    """The last few values, by key.
+
+    Threads that need the same key at once may compute it twice, and all get the first value.
+
+    Args:
+        most: how many are kept.
+    """
+
+    def __init__(self, most: int) -> None:
+        self._most, self._values, self._lock = most, dict[Key, Value](), threading.Lock()
+
+    def __call__(self, key: Key, make: Callable[[], Value]) -> Value:
+        """The value of a key, computed where it is not there."""
+        if (value := self._values.get(key)) is not None:
+            return value
+        value = make()  # may take long, and ask for others of its kind
+        with self._lock:
+            while key not in self._values and len(self._values) >= self._most:
+                del self._values[next(iter(self._values))]
+            return self._values.setdefault(key, value)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return BoundedCache, (self._most,)  # locks cannot be stored

@@ -16,8 +16,6 @@ CHARACTER = 0.55 / 72
 Show = Callable[[float, str], None]
 """Told how much is done, and a word or two on it."""
 FORMAT = "{desc}: {percentage:3.0f}%|{bar}| {n:.4g} of {total:.4g} {unit} [{elapsed}<{remaining}]"
-PAUSE = 0.2
-"""The line is drawn anew not more often than every so many seconds."""
 
 
 def on_one_screen(title: str, lines: Iterable[str], count: int) -> str:
@@ -83,9 +81,7 @@ def progress(total: float, unit: str, stage: str) -> Iterator[Show]:
     if bar_of is None:
         yield lambda _done, _stage: None
         return
-    with bar_of(
-        total=total, desc=stage, unit=unit, bar_format=FORMAT, mininterval=PAUSE, leave=False, dynamic_ncols=True
-    ) as bar:
+    with bar_of(total=total, desc=stage, unit=unit, bar_format=FORMAT, leave=False, dynamic_ncols=True) as bar:
 
         def show(done: float, stage: str) -> None:
             bar.set_description_str(stage, refresh=False)

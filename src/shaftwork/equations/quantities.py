@@ -18,8 +18,7 @@ from shaftwork.components.branches import INTEGRAL, RATE, End
 from shaftwork.core.domains import ELECTRICAL, Domain, Quantity
 from shaftwork.core.errors import CompileError
 from shaftwork.formulation.form import branch_name, integral_name
-from shaftwork.network.controlled import readings_of
-from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
+from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart, readings_of
 from shaftwork.network.kinds import Kind
 
 Ends = tuple[int, int]

@@ -22,8 +22,7 @@ from shaftwork.formulation.view import View, controlled_problems, reads_itself, 
 from shaftwork.network.checks import LEFT_OUT, connection_problems, examine
 from shaftwork.network.graph import CircuitGraph, GraphBranch, GraphPart, build_graph
 from shaftwork.network.kinds import Kind
-from shaftwork.network.netlist import Netlist
-from shaftwork.network.wording import at_nodes, listed, title
+from shaftwork.network.netlist import Netlist, at_nodes, listed, title
 
 _LACKING = (
     *("floating part", "loose end", "controlled source", "massless node", "algebraic loop", "undetermined speed"),

@@ -13,14 +13,13 @@ import networkx as nx
 from sympy import Add, Dummy, Expr, Integer, Matrix, Symbol
 
 from shaftwork.components.branches import ACROSS, INTEGRAL, RATE
-from shaftwork.components.clips import replaced
 from shaftwork.components.law_slopes import slope
+from shaftwork.components.laws import replaced
 from shaftwork.components.laws import t as TIME
 from shaftwork.formulation.form import StateForm
 from shaftwork.formulation.gains import exact_of
 from shaftwork.formulation.tree import Row
-from shaftwork.network.controlled import Reading, readings_of
-from shaftwork.network.graph import GROUND
+from shaftwork.network.graph import GROUND, Reading, readings_of
 from shaftwork.network.kinds import Kind
 
 

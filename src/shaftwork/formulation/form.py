@@ -25,10 +25,8 @@ from shaftwork.components.base import Signal
 from shaftwork.components.branches import RATE
 from shaftwork.core.domains import ROTATION, Domain
 from shaftwork.formulation.tree import NormalTree, normal_tree
-from shaftwork.network.changing_stores import is_bounded
-from shaftwork.network.controlled import Reading, readings_of
-from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart, signals_of
-from shaftwork.network.kinds import Kind
+from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart, Reading, readings_of, signals_of
+from shaftwork.network.kinds import Kind, is_bounded
 
 KINDS = ("across", "through", "integral", "rate")
 """What laws read besides what is across their own branches, in the order of `StateForm.readings`."""

@@ -16,9 +16,9 @@ from sympy import Add, Expr, Integer, Symbol, nan, oo, zoo
 
 from shaftwork.components.base import Signal
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, End, across_of, integral_of, through_of
-from shaftwork.components.clips import replaced
 from shaftwork.components.discontinuities import parts
 from shaftwork.components.law_slopes import slope
+from shaftwork.components.laws import replaced
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Modes
 from shaftwork.core.errors import Diagnostic, NetworkError

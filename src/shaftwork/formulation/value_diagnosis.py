@@ -20,7 +20,7 @@ from shaftwork.formulation.tree import Row, balance_of, column_of
 from shaftwork.formulation.view import View
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
 from shaftwork.network.kinds import Kind
-from shaftwork.network.wording import at_nodes, listed, title
+from shaftwork.network.netlist import at_nodes, listed, title
 
 SINGULAR = 1e-13
 """Reciprocal condition below which coupled values cancel, and a block of equations has no solution to speak of."""

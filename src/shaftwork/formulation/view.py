@@ -14,10 +14,9 @@ from shaftwork.components.branches import ACROSS
 from shaftwork.core.domains import Domain
 from shaftwork.core.errors import Diagnostic
 from shaftwork.formulation.form import StateForm
-from shaftwork.network.controlled import Reading, readings_of
-from shaftwork.network.graph import GROUND, ends_of
+from shaftwork.network.graph import GROUND, Reading, ends_of, readings_of
 from shaftwork.network.kinds import Kind
-from shaftwork.network.wording import Spelling, at_nodes, title
+from shaftwork.network.netlist import Spelling, at_nodes, title
 
 
 @dataclass(frozen=True)

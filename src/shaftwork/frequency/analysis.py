@@ -30,10 +30,9 @@ from shaftwork.frequency import campbell as diagram
 from shaftwork.frequency.linear_model import ExactModel, LinearModel, linear_model
 from shaftwork.frequency.linearization import Linearization
 from shaftwork.frequency.natural_modes import MOVES, Modes
-from shaftwork.network.controlled import Reading, readings_of
-from shaftwork.network.graph import CircuitGraph
+from shaftwork.network.graph import CircuitGraph, Reading, readings_of
 from shaftwork.network.kinds import Kind
-from shaftwork.network.wording import listed
+from shaftwork.network.netlist import listed
 from shaftwork.pipeline.arguments import Names, Point, Time, as_names
 from shaftwork.pipeline.prepared import OperatingPoint
 from shaftwork.pipeline.settled import SteadyState

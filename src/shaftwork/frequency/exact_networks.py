@@ -16,8 +16,8 @@ from shaftwork.codegen.start_values import initial_state
 from shaftwork.components.modes import ModeChoice
 from shaftwork.components.shaft_models import MOST_SPECTRAL, OneSpring, Rigid, Spectral, Wave
 from shaftwork.components.shafts import Shaft
+from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import AccuracyWarning, NetworkWarning, ParameterError
-from shaftwork.core.kept import Kept
 from shaftwork.core.notices import muted
 from shaftwork.frequency.analysis import (
     SmallMotions,
@@ -33,7 +33,7 @@ from shaftwork.frequency.linear_model import ExactModel
 from shaftwork.frequency.linearization import Linearization
 from shaftwork.frequency.natural_modes import Modes, find_modes
 from shaftwork.network.graph import resolve
-from shaftwork.network.netlist import Netlist, Placed
+from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import Names, Point, Time
 from shaftwork.pipeline.model import Model
 from shaftwork.results.solution import Solution
@@ -88,7 +88,7 @@ class ExactNetwork:
 
     def __init__(self, model: Model, compiled: Compile, shafts: Mapping[str, Shaft]) -> None:
         self._model, self._compiled, self._shafts = model, compiled, shafts
-        self._meshes = Kept[tuple[int, ...], Model](MESHES)
+        self._meshes = BoundedCache[tuple[int, ...], Model](MESHES)
 
     @cached_property
     def _own(self) -> Model:
@@ -105,7 +105,7 @@ class ExactNetwork:
     @cached_property
     def _values(self) -> tuple[Mapping[str, float], ...]:
         """The parameters of the exact shafts in SI."""
-        return tuple(resolve(Placed(shaft, ()))[0].values for shaft in self._shafts.values())
+        return tuple(resolve(shaft)[0] for shaft in self._shafts.values())
 
     @cached_property
     def lines(self) -> ExactLines:
@@ -219,7 +219,7 @@ class ExactPhases:
 
     def __init__(self, model: PhasedModel, compiled: Compile, shafts: Mapping[str, Shaft]) -> None:
         self._model, self._compiled, self._shafts = model, compiled, shafts
-        self._networks = Kept[tuple[str, ...], ExactNetwork](MESHES)
+        self._networks = BoundedCache[tuple[str, ...], ExactNetwork](MESHES)
 
     @cached_property
     def _own(self) -> PhasedModel:

@@ -26,7 +26,7 @@ from shaftwork.hybrid.hybrid_solution import solution
 from shaftwork.hybrid.hybrid_state import HybridState, passes_limit
 from shaftwork.hybrid.named_phases import known_modes, modes_in, whole_name, words_of
 from shaftwork.hybrid.phases import Phases
-from shaftwork.network.wording import listed
+from shaftwork.network.netlist import listed
 from shaftwork.pipeline.arguments import Demand, Given, Point, Time
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.prepared import OperatingPoint

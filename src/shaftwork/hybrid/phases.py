@@ -10,8 +10,8 @@ import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.components.modes import ModeChoice
+from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import NetworkError, NetworkWarning, ParameterError, SimulationError
-from shaftwork.core.kept import Kept
 from shaftwork.core.notices import muted
 from shaftwork.formulation.value_diagnosis import jamming, self_locks
 from shaftwork.hybrid.hybrid_state import AHEAD_OF_RUN, ROUNDINGS, HybridState, Regime
@@ -20,22 +20,18 @@ from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, ModeNames, at_rest, 
 from shaftwork.hybrid.modes.reactions import MANY, ReactionEquations, laws_that_hold
 from shaftwork.hybrid.starts import begins_anew
 from shaftwork.integrate import choice
-from shaftwork.integrate.engines import ADAMS, available
+from shaftwork.integrate.engines import ADAMS, ENGINES, INNER, WAVE, available
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import Ending
 
 FOLLOWING = {
-    "heyoka": (1.0, 1e-12),  # the cost grows only with the logarithm
-    "scipy": (1 / 30, 1e-7),
-    "scipy-radau": (1 / 30, 1e-7),
-    "sundials": (1 / 300, 1e-8),
-    ADAMS: (1 / 100, 1e-8),
-    "wave": (1.0, 1e-6),  # its panels leave out a tenth of the tolerance
+    name: entry.following
+    for name, entry in (*ENGINES.items(), *INNER.items(), ("wave", WAVE))
+    if entry.following is not None
 }
-"""Engines that follow guards. An error grows with every change of mode, by some hundreds through sixty contacts, so
-they run with this part of the tolerance that is asked for, and with no looser one than the second number."""
+"""Engines that follow guards: the part of the tolerance that they run with, and the loosest one."""
 _ENGINES = ", ".join(name for name in FOLLOWING if name not in (ADAMS, "wave"))
 
 
@@ -59,7 +55,7 @@ class Phases:
         self._holding: dict[tuple[tuple[str, ...], tuple[int, ...]], ReactionEquations] = {}
         self._engines: dict[tuple[ModeEquations, ModeNames, str], tuple[str, str]] = {}
         self._easy: dict[ModeEquations, dict[tuple[int, str], tuple[str, str]]] = {}
-        self.last_run = Kept[Any, Any](1)
+        self.last_run = BoundedCache[Any, Any](1)
         """What the last run has learned, by its values and times: the next like it goes on with that."""
 
     def assembly(self, modes: ModeNames) -> ModeEquations:

@@ -18,8 +18,8 @@ from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, readings_in
 from shaftwork.components.discontinuities import line
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import ANEW, Modes
+from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import AccuracyWarning, ParameterError, no_value
-from shaftwork.core.kept import Kept
 from shaftwork.core.notices import warn
 from shaftwork.formulation.observables import Observables
 from shaftwork.hybrid.modes.mode_machines import ModeMachine, ModeNames
@@ -53,7 +53,7 @@ class ElementReadings:
         # of each element the place where what it shows begins
         self._firsts = tuple(accumulate((2 + len(symbols) for symbols in self._symbols), initial=0))
         self._speeds: dict[int, Callable[..., Any]] = {}
-        self._bound = Kept[tuple[int, bytes], Callable[..., Any]](SPEEDS)
+        self._bound = BoundedCache[tuple[int, bytes], Callable[..., Any]](SPEEDS)
 
     def first_modes(self, t: float, read: Sequence[float], p: Array) -> ModeNames:
         """The mode of each element in which a motion starts, in the equations in which nothing is joined by a mode."""

@@ -25,6 +25,9 @@ class EngineEntry:
         extra: the extra that brings it.
         options: keyword arguments of the function.
         finest: relative tolerance below which it takes none; 0 where it has no step error.
+        following: of an engine that follows guards, the part of the tolerance that it then runs with, and the loosest
+            one: an error grows with every change of mode, by some hundreds through sixty contacts.
+        absolute: whether it has an absolute tolerance.
     """
 
     function: str
@@ -34,6 +37,8 @@ class EngineEntry:
     extra: str = ""
     options: tuple[tuple[str, str], ...] = ()
     finest: float = 0.0
+    following: tuple[float, float] | None = None
+    absolute: bool = True
 
     @property
     def installed(self) -> bool:
@@ -43,12 +48,22 @@ class EngineEntry:
 
 # Below these tolerances scipy's methods only warn, SUNDIALS refuses (near the rounding of numbers), the rounding in the
 # stage equations of the banded engine is larger, and so is that of coefficients of rounded numbers on a wave.
-_SCIPY = EngineEntry("shaftwork.integrate.scipy_ivp:solve", "everything that is not stiff", finest=100 * EPS)
-WAVE = EngineEntry("shaftwork.waves.delay_engine.engine:solve", "travelling waves", finest=1e-12)
+_SCIPY = EngineEntry(
+    "shaftwork.integrate.scipy_ivp:solve", "everything that is not stiff", finest=100 * EPS, following=(1 / 30, 1e-7)
+)
+WAVE = EngineEntry(
+    "shaftwork.waves.delay_engine.engine:solve",
+    "travelling waves",
+    finest=1e-12,
+    following=(1.0, 1e-6),  # its panels leave out a tenth of the tolerance
+    absolute=False,
+)
 """The engine of networks with waves, which no others can take."""
 
 ENGINES: dict[str, EngineEntry] = {
-    "exact": EngineEntry("shaftwork.integrate.linear.propagation:solve", "linear systems, without a step error"),
+    "exact": EngineEntry(
+        "shaftwork.integrate.linear.propagation:solve", "linear systems, without a step error", absolute=False
+    ),
     "heyoka": EngineEntry(
         "shaftwork.integrate.taylor.heyoka_taylor:solve",
         "smooth and piecewise laws, compiled",
@@ -56,9 +71,16 @@ ENGINES: dict[str, EngineEntry] = {
         "heyoka",
         "fast",
         finest=1e-15,
+        following=(1.0, 1e-12),  # the cost grows only with the logarithm
     ),
     "sundials": EngineEntry(
-        "shaftwork.integrate.sundials:solve", "stiff systems", "sksundae", "scikit-sundae", "stiff", finest=8 * EPS
+        "shaftwork.integrate.sundials:solve",
+        "stiff systems",
+        "sksundae",
+        "scikit-sundae",
+        "stiff",
+        finest=8 * EPS,
+        following=(1 / 300, 1e-8),
     ),
     "scipy": _SCIPY,
     "scipy-radau": replace(_SCIPY, purpose="stiff systems", options=(("method", "Radau"),)),
@@ -67,7 +89,7 @@ ENGINES: dict[str, EngineEntry] = {
 
 # Another method of an engine, which a run chooses by itself.
 ADAMS = "sundials-adams"
-INNER = {ADAMS: replace(ENGINES["sundials"], options=(("method", "Adams"),))}
+INNER = {ADAMS: replace(ENGINES["sundials"], options=(("method", "Adams"),), following=(1 / 100, 1e-8))}
 
 
 def available(name: str) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.core.errors import SimulationError
-from shaftwork.core.times import around
+from shaftwork.numerics.zeros import around
 
 Array = NDArray[np.float64]
 Cached = TypeVar("Cached")

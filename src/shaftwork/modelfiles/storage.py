@@ -1,28 +1,30 @@
-"""Networks to text files and back: what `textfile` reads and writes, in terms of components."""
+"""Networks to text files and back: what `textfile` reads and writes, in terms of components; laws as text."""
 
 from __future__ import annotations
 
 import reprlib
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
+import sympy
 from sympy import Expr
+from sympy.core.relational import Relational
+from sympy.printing.precedence import PRECEDENCE
+from sympy.printing.str import StrPrinter
 
 from shaftwork.components import REGISTRY, Component, Table
+from shaftwork.components.laws import SYMBOLS
 from shaftwork.components.tables import Interpolation
 from shaftwork.core.errors import ModelFileError, ParameterError
 from shaftwork.core.files import replaced
 from shaftwork.modelfiles import textfile
 from shaftwork.modelfiles.textfile import ModelText, PartText
-from shaftwork.network import expressions
-from shaftwork.network.expression_reader import parse
-from shaftwork.network.grammar import fault_of, words_of
-from shaftwork.network.netlist import Netlist, Origin, Placed
-from shaftwork.network.wording import title
+from shaftwork.network.expressions import parse
+from shaftwork.network.grammar import COMPARISONS, FUNCTION_NAMES, FUNCTIONS, LIMITS, fault_of, words_of
+from shaftwork.network.netlist import Netlist, Origin, Placed, title
 
-MAXIMUM_LAW_WORDS = 4000
-"""Numbers, names and signs of all laws of a file together, some 400 laws: more take too long to read."""
+_SIGNS = {relation: sign for sign, relation in COMPARISONS.items()}
 
 
 def netlist_text(netlist: Netlist) -> str:
@@ -105,9 +107,9 @@ def _refuse_endless_laws(model: ModelText) -> None:
                 words += len(words_of(value))
             except ModelFileError as error:
                 raise _fault(part, name, f"{name}: {error}") from None
-            if words > MAXIMUM_LAW_WORDS:
+            if words > LIMITS.file_words:
                 raise ModelFileError(
-                    f"The laws of the file have more than {MAXIMUM_LAW_WORDS} words together. Give curves as tables, "
+                    f"The laws of the file have more than {LIMITS.file_words} words together. Give curves as tables, "
                     "or build the network in Python."
                 )
 
@@ -119,7 +121,7 @@ def _is_law(cls: type[Component] | None, name: str) -> bool:
 
 def _part_text(placed: Placed) -> PartText:
     part = placed.part
-    values = {name: _written(part, name) for name in part.declared if not _is_default(part, name)}
+    values = {name: _saved(part, name) for name in part.declared if not _is_default(part, name)}
     return PartText(type(part).__name__, part.name, placed.nodes, values, part.symbol)
 
 
@@ -131,7 +133,7 @@ def _is_default(part: Component, name: str) -> bool:
     return not declared.required and isinstance(value := getattr(part, name), kinds) and value == declared.default
 
 
-def _written(part: Component, name: str) -> Any:
+def _saved(part: Component, name: str) -> Any:
     declared = part.declared[name]
     value, objection = declared.magnitude(getattr(part, name))
     if objection is not None:
@@ -143,7 +145,7 @@ def _written(part: Component, name: str) -> Any:
     if fault := fault_of(value):  # before the text is made, which would be refused where it is read again
         raise ModelFileError(f"{title(part)}: {name} {fault}, so it cannot be saved. Write large numbers as floats.")
     try:
-        return expressions.write(value)
+        return write(value)
     except ModelFileError as error:
         raise ModelFileError(f"{title(part)}: {name} cannot be saved: {error}") from None
 
@@ -188,3 +190,68 @@ def _fault(part: PartText, key: str, reason: str) -> ModelFileError:
     declared = getattr(REGISTRY.get(part.type), "declared", {}).get(key)
     unit = f" It is a law for {key} in {declared.unit}." if declared is not None and declared.law else ""
     return ModelFileError(f"line {part.lines.get(key, part.lines[''])}, {part.type} '{part.name}': {reason}{unit}")
+
+
+def write(expression: sympy.Expr) -> str:
+    """The text of an expression: `parse` of it is the same expression, floats to the last bit.
+
+    Args:
+        expression: a law of the package's symbols.
+
+    Raises:
+        ModelFileError: a part is not in the grammar, or sympy builds the expression differently when it is read again.
+    """
+    try:
+        text: str = _LawPrinter().doprint(expression)
+    except RecursionError:
+        raise ModelFileError("the expression is nested too deeply for text. Split it or use a Table.") from None
+    if (again := parse(text)) != expression:
+        raise ModelFileError(
+            f"the expression {text[:200]} reads back as {str(again)[:200]}, because sympy rewrites it whenever it is "
+            "built. Save the rewritten form: expression.func(*expression.args), or sympy.expand(expression)."
+        )
+    return text
+
+
+class _LawPrinter(StrPrinter):  # type: ignore[misc]
+    """Expressions as sympy prints them, where the grammar of `parse` has another form or less."""
+
+    def _print_Symbol(self, node: sympy.Symbol) -> str:
+        return str(node.name) if node in SYMBOLS else self._refused(node)
+
+    def _print_Function(self, node: sympy.Function) -> str:
+        function = FUNCTIONS.get(node.func.__name__)
+        is_listed = isinstance(node, sympy.Piecewise) or (function is not None and function.make is node.func)
+        return str(super()._print_Function(node)) if is_listed else self._refused(node)
+
+    def _print_Float(self, node: sympy.Float) -> str:
+        value = float(node)
+        if sympy.Float(value) != node:
+            raise ModelFileError(
+                f"the number {node} has more digits than a float. Round it with sympy.Float(number, 15)."
+            )
+        return repr(value)
+
+    def _print_Exp1(self, _node: sympy.Expr) -> str:
+        return "exp(1)"
+
+    def _print_Relational(self, node: Relational) -> str:
+        sides = [self.parenthesize(side, PRECEDENCE["Add"]) for side in (node.lhs, node.rhs)]
+        return f" {_SIGNS[node.func]} ".join(sides)
+
+    def _print_And(self, node: sympy.And) -> str:
+        return " and ".join(self.parenthesize(part, PRECEDENCE["And"]) for part in sympy.ordered(node.args))
+
+    def _print_Or(self, node: sympy.Or) -> str:
+        return " or ".join(self.parenthesize(part, PRECEDENCE["Or"]) for part in sympy.ordered(node.args))
+
+    def _print_Not(self, node: sympy.Not) -> str:
+        return f"not {self.parenthesize(node.args[0], PRECEDENCE['Relational'])}"
+
+    def _refused(self, node: sympy.Basic) -> NoReturn:
+        names = ", ".join(symbol.name for symbol in SYMBOLS)
+        raise ModelFileError(
+            f"{str(node)[:80]} ({node.func.__name__}) is not in the grammar of model files. "
+            f"Symbols: {names} of this package, pi. Functions: {FUNCTION_NAMES}. Tabulate it, or keep this law in a "
+            "script."
+        )

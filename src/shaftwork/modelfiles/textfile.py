@@ -10,7 +10,7 @@
     c = 24206.0
     d = 14.0
 
-Values are numbers, texts (laws, see `expressions`) and tables `{ x = [...], y = [...] }`. A file is plain data, which
+Values are numbers, texts (laws, see `storage.write`) and tables `{ x = [...], y = [...] }`. A file is plain data, which
 `tomllib` reads. Keys of many dots, with which it would take hours, are refused before.
 """
 
@@ -29,19 +29,15 @@ from typing import Any
 
 from shaftwork.components.tables import Table
 from shaftwork.core.errors import ModelFileError, ParameterError
-from shaftwork.network.netlist import IMPACTS, Impacts
-from shaftwork.network.wording import MAXIMUM_NAME, is_name
+from shaftwork.network.grammar import LIMITS
+from shaftwork.network.netlist import IMPACTS, MAXIMUM_NAME, Impacts, is_name
 
 FORMAT = 1
 """Version of the format; a reader refuses any other."""
-MAXIMUM_SIZE = 2_500_000
+LARGEST_FILE = 2_500_000
 """Bytes of a model file; 20000 parts take about 2 000 000."""
-MAXIMUM_KEY = 64
+LONGEST_KEY = 64
 """Characters of the name of a parameter."""
-MAXIMUM_TEXT = 200_000
-"""Characters of a text value; a law with long tables takes most of them."""
-MAXIMUM_INTEGER = 2**63 - 1
-"""Largest integer, that of TOML."""
 
 Value = int | float | str | Table
 """What a parameter may be in a file."""
@@ -179,11 +175,11 @@ def _text_of(path: Path) -> str:
             reason = "is no file" if path.exists() else f"does not exist, seen from {Path.cwd()}"
             raise FileNotFoundError(reason)
         with path.open("rb") as file:
-            content = file.read(MAXIMUM_SIZE + 1)
+            content = file.read(LARGEST_FILE + 1)
     except (OSError, ValueError) as error:
         raise ModelFileError(f"{path} cannot be read: {error}. Give the path of a model file.") from None
-    if len(content) > MAXIMUM_SIZE:
-        raise ModelFileError(f"{path}: has more than {MAXIMUM_SIZE} bytes. Split the model.")
+    if len(content) > LARGEST_FILE:
+        raise ModelFileError(f"{path}: has more than {LARGEST_FILE} bytes. Split the model.")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -233,8 +229,8 @@ def _part_lines(text: str) -> list[dict[str, int]]:
 
 
 def _model(text: str, *, is_file: bool) -> ModelText:
-    if len(text) > MAXIMUM_SIZE:
-        raise ModelFileError(f"there are more than {MAXIMUM_SIZE} characters. Split the model.")
+    if len(text) > LARGEST_FILE:
+        raise ModelFileError(f"there are more than {LARGEST_FILE} characters. Split the model.")
     if "=" not in text:
         what = _shown(text) if text.strip() else "an empty text"
         hint = "" if is_file else ' To read a file, give its place as pathlib.Path("crane.toml").'
@@ -301,18 +297,18 @@ def _check_name(key: str, value: Any) -> None:
 
 def _checked(key: str, value: Any) -> Value:
     """A parameter's value as it can stand in a file."""
-    if not isinstance(key, str) or not _KEY.fullmatch(key) or key in _RESERVED or len(key) > MAXIMUM_KEY:
+    if not isinstance(key, str) or not _KEY.fullmatch(key) or key in _RESERVED or len(key) > LONGEST_KEY:
         raise ModelFileError(f"{key} is no name of a parameter. Use letters, digits and _, not {', '.join(_RESERVED)}.")
     match value:
         case bool():
             raise ModelFileError(f"{key} is {_shown(value)}, which is no number. Write 0, 1 or a text.")
-        case int() if abs(value) <= MAXIMUM_INTEGER:
+        case int() if abs(value) < 2**63:  # as TOML has them
             return int(value)
         case float() if math.isfinite(value):
             return float(value)
-        case str() if len(value) > MAXIMUM_TEXT:
+        case str() if len(value) > LIMITS.length:
             raise ModelFileError(
-                f"{key} has {len(value)} characters, more than {MAXIMUM_TEXT}. Use a Table of fewer points."
+                f"{key} has {len(value)} characters, more than {LIMITS.length}. Use a Table of fewer points."
             )
         case str() if value.isprintable():
             return value

@@ -22,9 +22,18 @@ from shaftwork.core.errors import Diagnostic, ShaftworkError
 from shaftwork.network.graph import GROUND, CircuitGraph, resolve, signals_of
 from shaftwork.network.kinds import Kind
 from shaftwork.network.law_faults import Fault, instead_of, law_faults
-from shaftwork.network.netlist import REFERENCE, Netlist, Placed
-from shaftwork.network.sharing import Shared
-from shaftwork.network.wording import MAXIMUM_NAME, Spelling, at_nodes, is_name, listed, title
+from shaftwork.network.netlist import (
+    MAXIMUM_NAME,
+    REFERENCE,
+    Netlist,
+    Placed,
+    Spelling,
+    at_nodes,
+    is_name,
+    listed,
+    title,
+)
+from shaftwork.network.templates import Shared
 
 LEFT_OUT = ("node name", "node count", "wrong domain", "no effect", "component")
 """Kinds of problems whose part is left out of what is examined further."""
@@ -169,10 +178,10 @@ class _Examination:
         """The part with values that can be used in place of those that cannot; None if it yields no branches."""
         part = placed.part
         try:
-            resolved, objections = resolve(placed)
+            values, objections = resolve(part)
             for name, value, objection in objections:
                 self._report_value(placed, name, value, objection)
-            faults = self._faults_of(part, resolved.values)
+            faults = self._faults_of(part, values)
         except ShaftworkError as error:
             self.report("component", f"{title(part)}: {error}", "Correct its branches().", placed)
             return None

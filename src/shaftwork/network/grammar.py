@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NoReturn
+from typing import NamedTuple, NoReturn
 
 import sympy
 from sympy.core.relational import Relational
@@ -15,23 +15,34 @@ from sympy.logic.boolalg import BooleanAtom, BooleanFunction
 from shaftwork.components import noise
 from shaftwork.core.errors import ModelFileError
 
-MAXIMUM_LENGTH = 200_000
-"""Characters of an expression; long tables take most of them."""
-MAXIMUM_WORDS = 1000
-"""Numbers, names and signs of an expression; a list of a table counts as one."""
-MAXIMUM_DEPTH = 30
-"""Parentheses, functions and exponents inside each other."""
-MAXIMUM_DIGITS = 60
-"""Characters of a number as it is written."""
-MAXIMUM_INTEGER = 10**40
-"""Largest integer, numerator and denominator, also of intermediate results."""
-MAXIMUM_EXPONENT = 1000
-"""Largest exponent that is a number."""
-MAXIMUM_TOWER = 4
-"""Powers in an exponent without symbols: sympy takes four times as long for each to find how large it is."""
-MAXIMUM_EXTREMA = 16
-"""Arguments of all Max and Min of an expression together: sympy compares each with each."""
 
+class Limits(NamedTuple):
+    """What laws as text may ask for: without them a short text could take hours or all memory to read.
+
+    Args:
+        length: characters of an expression; long tables take most of them.
+        words: numbers, names and signs of an expression; a list of a table counts as one.
+        depth: parentheses, functions and exponents inside each other.
+        digits: characters of a number as it is written.
+        integer: largest integer, numerator and denominator, also of intermediate results.
+        exponent: largest exponent that is a number.
+        tower: powers in an exponent without symbols: sympy takes four times as long for each to find how large it is.
+        extrema: arguments of all Max and Min of an expression together: sympy compares each with each.
+        file_words: words of all laws of a file together, some 400 laws.
+    """
+
+    length: int = 200_000
+    words: int = 1000
+    depth: int = 30
+    digits: int = 60
+    integer: int = 10**40
+    exponent: int = 1000
+    tower: int = 4
+    extrema: int = 16
+    file_words: int = 4000
+
+
+LIMITS = Limits()
 NOT_REAL = "has a part without a finite real value"
 
 Boolean = Relational | BooleanFunction | BooleanAtom
@@ -64,8 +75,8 @@ FUNCTIONS: dict[str, Function] = {
     "Abs": Function(sympy.Abs, 1, 1, abs),
     "sign": Function(sympy.sign, 1, 1, _sign),
     "Heaviside": Function(sympy.Heaviside, 1, 2, _heaviside),
-    "Max": Function(sympy.Max, 1, MAXIMUM_EXTREMA, lambda *values: max(values)),
-    "Min": Function(sympy.Min, 1, MAXIMUM_EXTREMA, lambda *values: min(values)),
+    "Max": Function(sympy.Max, 1, LIMITS.extrema, lambda *values: max(values)),
+    "Min": Function(sympy.Min, 1, LIMITS.extrema, lambda *values: min(values)),
     "floor": Function(sympy.floor, 1, 1, math.floor),
     "HeldNoise": Function(noise.HeldNoise, 2, 2, noise.held),
     "SmoothNoise": Function(noise.SmoothNoise, 2, 2, noise.smooth),
@@ -104,9 +115,9 @@ def words_of(text: str) -> list[str]:
         ModelFileError: the text is beyond a limit, has a character that the grammar has no use for, or lacks a value, a
             sign or a parenthesis.
     """
-    if len(text) > MAXIMUM_LENGTH:
+    if len(text) > LIMITS.length:
         raise ModelFileError(
-            f"the expression of {len(text)} characters is longer than {MAXIMUM_LENGTH}. Use a Table of fewer points."
+            f"the expression of {len(text)} characters is longer than {LIMITS.length}. Use a Table of fewer points."
         )
     matches = list(_WORD.finditer(text))
     if other := next((match for match in matches if match["other"]), None):
@@ -120,17 +131,17 @@ def words_of(text: str) -> list[str]:
         shown = "but the expression ends" if ends else f"not {word[:20]!r}"
         if ends and not words:
             fail(text, place, "is empty", "Write a number or an expression.")
-        if len(words) == MAXIMUM_WORDS:
-            fail(text, place, f"has more than {MAXIMUM_WORDS} numbers, names and signs", "Use a Table.")
-        if len(word) > MAXIMUM_DIGITS and word[0] in "0123456789.":
-            fail(text, place, f"has a number of more than {MAXIMUM_DIGITS} characters", "17 digits are enough.")
+        if len(words) == LIMITS.words:
+            fail(text, place, f"has more than {LIMITS.words} numbers, names and signs", "Use a Table.")
+        if len(word) > LIMITS.digits and word[0] in "0123456789.":
+            fail(text, place, f"has a number of more than {LIMITS.digits} characters", "17 digits are enough.")
         if follows_value and (kind == "value" or word == "not" or (word == ")" and not depth)):
             fail(text, place, f"does not go on with {word[:20]!r}", "Write an operator between two values.")
         if not follows_value and kind != "value" and word not in _PREFIXES:
             fail(text, place, f"needs a value here, {shown}", "Write a number, a name, a function or a parenthesis.")
         depth += (word == "(") - (word == ")")
-        if depth > MAXIMUM_DEPTH:
-            fail(text, place, f"is nested deeper than {MAXIMUM_DEPTH}", "Use fewer parentheses.")
+        if depth > LIMITS.depth:
+            fail(text, place, f"is nested deeper than {LIMITS.depth}", "Use fewer parentheses.")
         if ends and depth:
             fail(text, place, f"needs ')' to close a parenthesis, {shown}", "Check the parentheses and commas.")
         follows_value = kind == "value" or word == ")"
@@ -138,24 +149,17 @@ def words_of(text: str) -> list[str]:
     return words
 
 
-def finite(number: float) -> float:
-    """The number itself; an OverflowError where it is infinite or NaN."""
-    if not math.isfinite(number):
-        raise OverflowError(number)
-    return number
-
-
 def fault_of(expression: sympy.Basic) -> str | None:
     """Why an expression is beyond the limits, or None where it is not."""
     for node in sympy.preorder_traversal(expression):
         if node in (sympy.nan, sympy.zoo, sympy.oo, -sympy.oo, sympy.I):
             return NOT_REAL
-        if isinstance(node, sympy.Rational) and max(abs(node.p), node.q) > MAXIMUM_INTEGER:
+        if isinstance(node, sympy.Rational) and max(abs(node.p), node.q) > LIMITS.integer:
             return "leads to an integer beyond 1e40"
         if isinstance(node, sympy.Float) and not (math.isfinite(float(node)) and bool(node) == bool(float(node))):
             return NOT_REAL
-        if isinstance(node, sympy.Pow) and node.exp.is_Number and abs(node.exp) > MAXIMUM_EXPONENT:
-            return f"has an exponent beyond {MAXIMUM_EXPONENT}"
+        if isinstance(node, sympy.Pow) and node.exp.is_Number and abs(node.exp) > LIMITS.exponent:
+            return f"has an exponent beyond {LIMITS.exponent}"
     return None
 
 

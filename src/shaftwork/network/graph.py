@@ -5,22 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import networkx as nx
 from sympy import Expr, Symbol
 
 from shaftwork.components.base import Component, Derived, Signal
 from shaftwork.components.branches import End, named_in
-from shaftwork.components.clips import replaced
-from shaftwork.components.laws import as_expression
+from shaftwork.components.laws import as_expression, replaced
 from shaftwork.components.modes import ModeChoice, Modes
 from shaftwork.components.tables import Table
 from shaftwork.core.domains import ROTATION, Domain
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed, overview
-from shaftwork.network.sharing import Shared
-from shaftwork.network.templates import BranchTemplate, Template, make_template, with_factors
+from shaftwork.network.templates import BranchTemplate, Shared, Template, make_template, with_factors
 
 GROUND = -1
 """Node number of the reference."""
@@ -194,24 +192,16 @@ def ends_of(branch: GraphBranch) -> tuple[tuple[tuple[int, int], int, int], ...]
     return (((branch.index, 0), branch.plus, branch.minus),)
 
 
-@dataclass(frozen=True)
-class ResolvedPart:
-    """A placed component with its parameter values in SI: floats, or expressions for laws."""
-
-    placed: Placed
-    values: Mapping[str, Any]
-
-
-def resolve(placed: Placed) -> tuple[ResolvedPart, tuple[tuple[str, Any, str], ...]]:
-    """The part with its values in SI, and the objections as (parameter, given value, objection).
+def resolve(part: Component) -> tuple[dict[str, Any], tuple[tuple[str, Any, str], ...]]:
+    """Values of a part in SI, floats or expressions of laws; and the objections as (parameter, given value, objection).
 
     A value that cannot be used is replaced by 1, a record by its default, so that the analysis of the network can go on
     and report everything.
     """
     values: dict[str, Any] = {}
     objections: list[tuple[str, Any, str]] = []
-    for name, declared in placed.part.declared.items():
-        entry = getattr(placed.part, name)
+    for name, declared in part.declared.items():
+        entry = getattr(part, name)
         value, objection = declared.magnitude(entry)
         if objection is None and not isinstance(value, float):
             value = as_expression(value) if isinstance(value, Table | Expr) else value  # the checks name the rest
@@ -219,7 +209,7 @@ def resolve(placed: Placed) -> tuple[ResolvedPart, tuple[tuple[str, Any, str], .
             objections.append((name, entry, objection))
             value = 1.0 if declared.record is None or declared.required else declared.magnitude(declared.default)[0]
         values[name] = value
-    return ResolvedPart(placed, values), tuple(objections)
+    return values, tuple(objections)
 
 
 class _Table:
@@ -239,7 +229,6 @@ class _Table:
 
 def build_graph(netlist: Netlist) -> CircuitGraph:
     """Netlist to graph. The netlist must have passed `checks.examine`."""
-    resolved = tuple(resolve(placed)[0] for placed in netlist.placed)
     table = _Table()
     for placed in netlist.placed:  # ports with a domain first, so that a Ground does not decide the domain of its node
         for port, node in zip(placed.part.ports, placed.nodes, strict=False):
@@ -249,15 +238,15 @@ def build_graph(netlist: Netlist) -> CircuitGraph:
     zeros: list[str] = []
     parts: list[GraphPart] = []
     branches: list[GraphBranch] = []
-    for item in resolved:
-        part, values = item.placed.part, item.values
-        template, read = table.templates.of(part, values, item.placed.choices)
+    for item in netlist.placed:
+        part, (values, _) = item.part, resolve(item.part)
+        template, read = table.templates.of(part, values, item.choices)
         places: dict[str, int] = {}
         for name in template.parameters:
             places[name] = len(parameters)
             parameters[f"{part.name}.{name}"] = values.get(name, 0.0)  # numbers of modes are no values of the part
         zeros.extend(f"{part.name}.{name}" for name, value in values.items() if isinstance(value, float) and not value)
-        nodes = _port_nodes(item.placed, table)
+        nodes = _port_nodes(item, table)
         first = len(branches)
         branches.extend(_place(branch, first + k, len(parts), nodes) for k, branch in enumerate(template.branches))
         numbers = tuple(range(first, len(branches)))
@@ -297,7 +286,7 @@ def effective(graph: CircuitGraph) -> frozenset[str]:
 
 
 def _effective_of(part: GraphPart, templates: Shared[Template]) -> Iterator[str]:
-    values = resolve(Placed(part.component, ()))[0].values
+    values = resolve(part.component)[0]
     forms = [templates.of(part.component, values, choices)[0] for choices in _mode_choices(part.modes)]
     laws = {item.name: item.law for template in forms for item in template.derived}
     pending, read = list(_symbols_of(forms)), set(part.consulted)
@@ -327,3 +316,57 @@ def _symbols_of(templates: Iterable[Template]) -> Iterator[Symbol]:
             for leave in mode.leaves:
                 for guard in (leave.when, leave.rebound, leave.rest):
                     yield from () if guard is None else guard.free_symbols
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A quantity of the circuit that a law reads.
+
+    Args:
+        kind: "across" (of a node against the reference), "through", "integral" or "rate" of across (of a branch).
+        of: number of the node or branch.
+    """
+
+    kind: Literal["across", "through", "integral", "rate"]
+    of: int
+
+
+def readings_of(graph: CircuitGraph, branch: int) -> Mapping[Symbol, Reading]:
+    """What the law of a branch reads besides its own, by the symbols of its template."""
+    reads = graph.branches[branch].template.reads
+    if not reads:
+        return {}
+    part = graph.part_of(branch)
+    readings: dict[Symbol, Reading] = {}
+    for symbol in reads:
+        kind, name = named_in(symbol)
+        if kind == "across":
+            readings[symbol] = Reading("across", part.nodes[name])
+        elif kind == "rate":
+            readings[symbol] = Reading("rate", branch)
+        else:
+            of = next(k for k in part.branches if _stands_for(graph.branches[k].template, kind, name))
+            readings[symbol] = Reading("through" if kind == "through" else "integral", of)
+    return readings
+
+
+def _stands_for(template: BranchTemplate, kind: str, label: str) -> bool:
+    """Whether a branch is the one that a law of its part reads under a label."""
+    readable = template.kind is Kind.THROUGH_STORE if kind == "through" else template.kind is not Kind.COUPLING
+    return template.label == label and readable
+
+
+def check_readings(part: Component, templates: tuple[BranchTemplate, ...]) -> None:
+    """That what the laws of a part read is there.
+
+    Raises:
+        ValueError: the part has no such port, no such store, no such branch.
+    """
+    ports = {port.name for port in (*part.ports, *part.inner_ports())}
+    for symbol in dict.fromkeys(symbol for template in templates for symbol in template.reads):
+        kind, name = named_in(symbol)
+        if kind == "across" and name not in ports:
+            raise ValueError(f"a law reads across_of({name!r}), but the part has no such port")
+        if kind in ("through", "integral") and not any(_stands_for(template, kind, name) for template in templates):
+            what = "spring or inductor" if kind == "through" else "branch between two nodes"
+            raise ValueError(f"a law reads {kind}_of({name!r}), but the part has no {what} of that label")

@@ -18,10 +18,9 @@ from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.components.tables import Interpolation, InterpolationSlope, Table
 from shaftwork.core.domains import ROTATION
 from shaftwork.core.parameters import is_label
-from shaftwork.network.changing_stores import StoreFaultError
-from shaftwork.network.controlled import check_readings
 from shaftwork.network.grammar import FUNCTION_NAMES, FUNCTIONS
-from shaftwork.network.kinds import Kind
+from shaftwork.network.graph import check_readings
+from shaftwork.network.kinds import Kind, StoreFaultError
 from shaftwork.network.templates import BranchTemplate, Template, make_template, substitution
 
 _READS: Mapping[Kind, frozenset[sympy.Symbol]] = {

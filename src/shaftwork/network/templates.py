@@ -6,13 +6,15 @@ of zero leaves no branch, a resistance of zero becomes a rigid joint, and neithe
 
 from __future__ import annotations
 
+import copy
 import dataclasses
+import itertools
 import reprlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import SimpleNamespace
-from typing import Any, TypeVar, get_args
+from typing import Any, Generic, TypeVar, get_args
 
 from sympy import Expr, Float, Integer, S, Symbol
 
@@ -40,8 +42,7 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import ModeChoice, Modes, has_mode, mode_symbol
 from shaftwork.core.domains import DOMAINS
 from shaftwork.core.errors import ShaftworkError
-from shaftwork.network.changing_stores import CHANGE, beyond_constant, changes, spring
-from shaftwork.network.kinds import Kind, Resolved, law_of, resolved
+from shaftwork.network.kinds import CHANGE, Kind, Resolved, beyond_constant, changes, law_of, resolved, spring
 
 T = TypeVar("T")
 
@@ -150,12 +151,13 @@ def make_template(part: Component, values: Mapping[str, Any], choices: tuple[Mod
     derived = tuple(_derived(part, p))
     modes = tuple(part.modes(p))
     symbols |= _choose(p, modes, choices)
-    resolver = _Resolver(_default_ends(part), tuple(symbols), _in_parameters(derived))
+    ends = (part.ports[0].name, part.ports[1].name if len(part.ports) > 1 else None)
+    resolver = _Resolver(ends, tuple(symbols), _in_parameters(derived))
     yielded = _without_absent(tuple(part.branches(p)))
     branches = tuple(
         template for number, branch in enumerate(yielded, 1) for template in resolver.templates(branch, number)
     )
-    return Template(branches, tuple(symbols.values()), _occurring(derived, resolver.printed), modes)
+    return Template(branches, tuple(symbols.values()), _occurring(derived, itertools.chain(*resolver.read)), modes)
 
 
 def _choose(p: Any, modes: tuple[Modes, ...], choices: tuple[ModeChoice, ...]) -> dict[Symbol, str]:
@@ -217,7 +219,7 @@ def _occurring(derived: tuple[Derived, ...], laws: Iterable[Expr]) -> tuple[Deri
 
 
 class _Resolver:
-    """Branches as templates; a law that many branches of a part share is looked at once.
+    """Branches as templates; a law that many share is looked at once; `read` has all of them, as equations print them.
 
     Args:
         default: ends of a branch that names none.
@@ -227,28 +229,22 @@ class _Resolver:
 
     def __init__(self, default: tuple[End, End], symbols: tuple[Symbol, ...], derived: Mapping[Symbol, Expr]) -> None:
         self._default, self._symbols, self._derived = default, symbols, derived
-        self._reduced: dict[Any, tuple[Resolved, ...]] = {}
-        self._read: dict[Any, tuple[tuple[Expr, ...], tuple[Symbol, ...]]] = {}
-
-    @property
-    def printed(self) -> Iterable[Expr]:
-        """Every law so far, as equations print it."""
-        return (law for laws in self._read for law in laws)
+        self._reduced: dict[Any, tuple[Resolved, ...] | None] = {}
+        self.read: dict[Any, tuple[tuple[Expr, ...], tuple[Symbol, ...]]] = {}
 
     def templates(self, branch: Branch, number: int) -> Iterator[BranchTemplate]:
         """None when the law vanishes, a rigid joint when it is infinite, two when it is affine."""
         match branch:
-            case IdealCoupling(terms, label):
-                exact = tuple((law_of(factor, branch, number), plus, minus) for factor, plus, minus in terms)
-                yield self._template(Kind.COUPLING, Integer(0), (None, None), exact, label)
-            case LossyCoupling(terms, through, label):
-                exact = tuple((law_of(factor, branch, number), plus, minus) for factor, plus, minus in terms)
+            case IdealCoupling() | LossyCoupling():
+                exact = tuple((law_of(factor, branch, number), plus, minus) for factor, plus, minus in branch.terms)
+                through = branch.through if isinstance(branch, LossyCoupling) else ()
                 factors = tuple(law_of(factor, branch, number) for factor in through)
-                yield self._template(Kind.COUPLING, Integer(0), (None, None), exact, label, factors)
-            case AcrossStore(law) | ThroughStore(law) if self._changes(branch, law, number):
-                yield from self._changing(branch, law_of(law, branch, number), number)
+                yield self._template(Kind.COUPLING, Integer(0), (None, None), exact, branch.label, factors)
             case AcrossStore(law, ends, label) | ThroughStore(law, ends, label) | ThroughLaw(law, ends, label):
-                for kind, reduced in self._resolved(branch, law, number):
+                if (kinds := self._resolved(branch, law, number)) is None:
+                    yield from self._changing(branch, law_of(law, branch, number), number)
+                    return
+                for kind, reduced in kinds:
                     joint = rigid(ends or self._default).terms if kind is Kind.COUPLING else ()
                     where = (None, None) if joint else ends or self._default
                     template = self._template(kind, reduced, where, joint, label)
@@ -271,16 +267,7 @@ class _Resolver:
                     f"branch {number} is {reprlib.repr(branch)}, which is no branch. branches() yields: {kinds}."
                 )
 
-    def _changes(self, branch: Branch, law: Any, number: int) -> bool:
-        """Whether a store depends on its angle or on time."""
-        try:
-            if (type(branch), law) in self._reduced:
-                return False
-        except TypeError:  # no expression, as `law_of` says
-            pass
-        return changes(law_of(law, branch, number))
-
-    def _changing(self, branch: AcrossStore | ThroughStore, law: Expr, number: int) -> Iterator[BranchTemplate]:
+    def _changing(self, branch: Any, law: Expr, number: int) -> Iterator[BranchTemplate]:
         """A store that depends on its angle or on time.
 
         Raises:
@@ -302,12 +289,15 @@ class _Resolver:
             rest, printed=rest.printed.xreplace({RATE: Integer(0)}), stored=energy.xreplace(self._derived)
         )
 
-    def _resolved(self, branch: Branch, law: Any, number: int) -> tuple[Resolved, ...]:
+    def _resolved(self, branch: Branch, law: Any, number: int) -> tuple[Resolved, ...] | None:
+        """The kinds and laws of a store or law; None of a store that depends on its angle or on time."""
         key = (type(branch), law)
         try:
             return self._reduced[key]
         except (KeyError, TypeError):  # a law that is no expression may have no hash
-            kinds = tuple(resolved(branch, law_of(law, branch, number)))
+            expression = law_of(law, branch, number)
+        is_store = isinstance(branch, AcrossStore | ThroughStore)
+        kinds = None if is_store and changes(expression) else tuple(resolved(branch, expression))
         self._reduced[key] = kinds
         return kinds
 
@@ -341,18 +331,69 @@ class _Resolver:
             )
         if stored == 0 or template.kind is Kind.CONDUCTANCE:
             return dataclasses.replace(template, conservative=True) if branch.conservative else template
-        read = template.law.free_symbols | stored.free_symbols
-        symbols = tuple(symbol for symbol in self._symbols if symbol in read)
+        _, symbols = self._in_parameters(template.law, stored)
         return dataclasses.replace(template, conservative=branch.conservative, stored=stored, symbols=symbols)
 
     def _in_parameters(self, *laws: Expr) -> tuple[tuple[Expr, ...], tuple[Symbol, ...]]:
         """Laws without derived quantities, and the symbols in them."""
-        if laws not in self._read:
+        if laws not in self.read:
             explicit = tuple(law.xreplace(self._derived) for law in laws)
             symbols = frozenset().union(*(law.free_symbols for law in explicit))
-            self._read[laws] = explicit, tuple(symbol for symbol in self._symbols if symbol in symbols)
-        return self._read[laws]
+            self.read[laws] = explicit, tuple(symbol for symbol in self._symbols if symbol in symbols)
+        return self.read[laws]
 
 
-def _default_ends(part: Component) -> tuple[End, End]:
-    return (part.ports[0].name, part.ports[1].name if len(part.ports) > 1 else None)
+Work = Callable[[Component, Mapping[str, Any], tuple[ModeChoice, ...]], T]
+
+
+class Shared(Generic[T]):
+    """A result for each class of parts, pattern of zeros, laws and choices of modes.
+
+    A part may look at its own numbers besides, as a shaft does for a mesh that suits its length. What it reads is
+    noted, and a part that differs in any of that gets a result of its own.
+
+    Args:
+        work: makes the result of a part, its values in SI and the choices of its modes.
+    """
+
+    def __init__(self, work: Work[T]) -> None:
+        self._work = work
+        self._results: dict[Any, list[tuple[Mapping[str, Any], T]]] = {}
+
+    def of(
+        self, part: Component, values: Mapping[str, Any], choices: tuple[ModeChoice, ...] = ()
+    ) -> tuple[T, Mapping[str, Any]]:
+        """The result for a part, and what was read of such a part besides; arguments as of `work`."""
+        pattern = tuple((float, bool(value)) if isinstance(value, float) else value for value in values.values())
+        results = self._results.setdefault((type(part), pattern, choices), [])
+        for read, result in results:
+            if all(_same(getattr(part, name), value) for name, value in read.items()):
+                return result, read
+        read = dict[str, Any]()
+        result = self._work(_noting(part, read), values, choices)
+        results.append((read, result))
+        return result, read
+
+
+def _same(first: Any, second: Any) -> bool:
+    try:
+        return first is second or bool(first == second)
+    except Exception:  # noqa: BLE001 (arrays, quantities of other units: whatever does not compare is another value)
+        return False
+
+
+def _noting(part: Component, read: dict[str, Any]) -> Component:
+    """A copy of a part that notes which of its own values are read."""
+    cls, fields = type(part), frozenset(part.__dataclass_fields__)
+
+    def __getattribute__(self: Any, name: str) -> Any:  # noqa: N807
+        if name in fields:
+            read[name] = cls.__getattribute__(self, name)
+        elif name == "__dict__":
+            read.update({field: cls.__getattribute__(self, field) for field in fields})
+        return cls.__getattribute__(self, name)
+
+    noting = copy.copy(part)
+    members = {"__getattribute__": __getattribute__, "declared": cls.declared, "__doc__": cls.__doc__}
+    object.__setattr__(noting, "__class__", type(cls.__name__, (cls,), members))
+    return noting

@@ -15,8 +15,8 @@ from shaftwork.formulation.form import StateForm, state_form
 from shaftwork.formulation.gains import exact_of
 from shaftwork.network.graph import CircuitGraph, GraphBranch
 from shaftwork.network.kinds import Kind
+from shaftwork.network.netlist import listed
 from shaftwork.network.templates import BranchTemplate
-from shaftwork.network.wording import listed
 
 
 def with_angles(graph: CircuitGraph, names: Sequence[str]) -> StateForm:

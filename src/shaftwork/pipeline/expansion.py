@@ -8,7 +8,7 @@ from dataclasses import replace
 from sympy import Expr
 
 from shaftwork.components.base import Component
-from shaftwork.components.rotation import Damper, Inertia, Spring
+from shaftwork.components.mechanics import Damper, Inertia, Spring
 from shaftwork.components.shaft_models import Rigid
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import ParameterError

@@ -16,9 +16,8 @@ from shaftwork.codegen.model_observer import ModelObserver
 from shaftwork.codegen.operating import steady_state
 from shaftwork.codegen.start_values import initial_state, with_others
 from shaftwork.codegen.undefined_laws import refuse_vanishing
-from shaftwork.core.calls import Callback
+from shaftwork.core.calls import BoundedCache, Callback
 from shaftwork.core.errors import Diagnostic, ParameterError
-from shaftwork.core.kept import Kept
 from shaftwork.core.notices import PulsationWarning, muted
 from shaftwork.core.parameters import in_si
 from shaftwork.core.screen import counted, named, on_one_screen
@@ -85,7 +84,7 @@ class Model(EngineModel):
     def __init__(self, form: StateForm, netlist: Netlist, rebuild: Callable[[Netlist], Model]) -> None:
         super().__init__(form)
         self.netlist, self._rebuild = netlist, rebuild
-        self._variants = Kept[tuple[tuple[str, float], ...], Model](VARIANTS)
+        self._variants = BoundedCache[tuple[tuple[str, float], ...], Model](VARIANTS)
         self._choices: list[tuple[tuple[float, float, float], Array, tuple[str, str]]] = []
 
     def __reduce__(self) -> tuple[Any, ...]:

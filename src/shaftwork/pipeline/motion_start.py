@@ -16,8 +16,7 @@ from shaftwork.core.errors import AccuracyWarning, Diagnostic, NetworkWarning, P
 from shaftwork.core.notices import muted, warn
 from shaftwork.core.parameters import in_si
 from shaftwork.network.graph import CircuitGraph
-from shaftwork.network.netlist import Netlist
-from shaftwork.network.wording import first_few, listed
+from shaftwork.network.netlist import Netlist, first_few, listed
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.results.solution import Solution
 

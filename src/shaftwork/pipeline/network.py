@@ -16,9 +16,8 @@ from shaftwork.equations.kirchhoff import kirchhoff
 from shaftwork.equations.records import Equations, NamedPhase
 from shaftwork.formulation.diagnosis import diagnose
 from shaftwork.formulation.form import StateForm
-from shaftwork.network.builder import NetworkBuilder
 from shaftwork.network.graph import CircuitGraph
-from shaftwork.network.netlist import Netlist
+from shaftwork.network.netlist import Netlist, NetworkBuilder
 from shaftwork.pipeline.angles import with_angles
 from shaftwork.pipeline.arguments import Point, Time, as_names
 from shaftwork.pipeline.model import Model

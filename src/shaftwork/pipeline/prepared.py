@@ -18,8 +18,8 @@ from shaftwork.codegen.start_values import initial_state
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.codegen.time_switches import Switching
 from shaftwork.codegen.undefined_laws import rough, without_value
+from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import CompileError
-from shaftwork.core.kept import Kept
 from shaftwork.formulation.form import StateForm
 from shaftwork.integrate.engines import available
 from shaftwork.integrate.problem import Fractions, LinearInputs, Observed, Problem
@@ -79,7 +79,7 @@ class EngineModel(CompiledModel):
 
     def __init__(self, form: StateForm) -> None:
         super().__init__(form)
-        self._prepared = Kept[bytes, Prepared](1)
+        self._prepared = BoundedCache[bytes, Prepared](1)
 
     @cached_property
     def switching(self) -> Switching:

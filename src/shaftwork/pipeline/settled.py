@@ -18,7 +18,7 @@ from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.errors import NetworkWarning, SimulationError
 from shaftwork.core.notices import hint, warn
 from shaftwork.network.kinds import Kind
-from shaftwork.network.wording import first_few
+from shaftwork.network.netlist import first_few
 
 if TYPE_CHECKING:
     from shaftwork.network.graph import CircuitGraph, GraphBranch

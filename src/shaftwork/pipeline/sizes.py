@@ -12,7 +12,7 @@ from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import AccuracyWarning
 from shaftwork.core.notices import warn
 from shaftwork.formulation.form import StateForm
-from shaftwork.integrate.engines import too_fine
+from shaftwork.integrate.engines import ENGINES, WAVE, too_fine
 from shaftwork.pipeline.arguments import NOMINAL, Demand, Sizes
 from shaftwork.pipeline.prepared import Prepared
 from shaftwork.results.solution import Solution
@@ -27,8 +27,6 @@ ENOUGH = 64
 """So many outputs show how large a motion is; fewer are no reason to look at the steps of heyoka, which costs a run."""
 LOOSEST = 1e-10
 """The tolerance of heyoka, where no tighter one is asked for; it is absolute while all states are below one."""
-FOLLOWED = ("scipy", "scipy-radau", "sundials", "banded", "heyoka")
-"""Engines with an absolute tolerance."""
 
 
 def in_its_size(form: StateForm, prepared: Prepared, demand: Demand, run: Callable[[Demand], Solution]) -> Solution:
@@ -55,7 +53,7 @@ def in_its_size(form: StateForm, prepared: Prepared, demand: Demand, run: Callab
 
 def _hidden(motion: Solution, form: StateForm, demand: Demand, tolerances: Array) -> Sizes | None:
     """The sizes of a motion of which the tolerances have hidden something; None where they have not."""
-    if motion.engine not in FOLLOWED or not motion.states:
+    if not ENGINES.get(motion.engine, WAVE).absolute or not motion.states:
         return None
     largest, rtol = _largest(motion), demand.rtol
     overall = max(largest.values())

@@ -11,7 +11,7 @@ import networkx as nx
 import numpy as np
 
 from shaftwork.components.contacts import Backlash
-from shaftwork.components.rotation import Damper, Inertia, Spring
+from shaftwork.components.mechanics import Damper, Inertia, Spring
 from shaftwork.components.sources import SpeedSource
 from shaftwork.core.domains import ROTATION
 from shaftwork.core.errors import Diagnostic, NetworkError

@@ -17,7 +17,6 @@ from shaftwork.components.modes import Leave, Mode, ModeChoice, Modes
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.network.graph import resolve
 from shaftwork.network.kinds import Kind
-from shaftwork.network.netlist import Placed
 from shaftwork.network.templates import BranchTemplate, Template, make_template
 from shaftwork.reduce.kinematics import Scale
 
@@ -61,8 +60,7 @@ class _PartView:
 
     @classmethod
     def of(cls, part: Component, scale: Scale, choices: tuple[ModeChoice, ...] = ()) -> _PartView:
-        nodes = tuple("ground" for _ in part.ports)
-        return cls(part, scale, make_template(part, resolve(Placed(part, nodes))[0].values, choices))
+        return cls(part, scale, make_template(part, resolve(part)[0], choices))
 
     def chosen(self, choices: tuple[ModeChoice, ...]) -> _PartView:
         return self.of(self.part, self.scale, choices) if choices else self
@@ -73,7 +71,7 @@ class _PartView:
 
     @cached_property
     def numbers(self) -> Mapping[Symbol, Float]:
-        values = resolve(Placed(self.part, ()))[0].values
+        values = resolve(self.part)[0]
         return {Symbol(name, real=True): Float(value) for name, value in values.items() if isinstance(value, float)}
 
     def value(self, law: Expr, at: Mapping[Symbol, float]) -> float:

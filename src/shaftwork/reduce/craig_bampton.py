@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from shaftwork.components.rotation import Inertia, PlanetaryGear, Spring
+from shaftwork.components.mechanics import Inertia, PlanetaryGear, Spring
 from shaftwork.network.netlist import REFERENCE
 from shaftwork.pipeline.network import Network
 from shaftwork.reduce.chain import Chain, Link, add_circuits, add_link, add_riders, series

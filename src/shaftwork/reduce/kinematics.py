@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 import networkx as nx
 from sympy import Expr, Float, S
 
-from shaftwork.components.rotation import LossyGear
+from shaftwork.components.mechanics import LossyGear
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import Diagnostic
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
 from shaftwork.network.kinds import Kind
-from shaftwork.network.wording import listed
+from shaftwork.network.netlist import listed
 
 AGREE = 1e-12
 """A fraction that is only rounding: of two ratios round a train, of a speed or of an inertia."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from shaftwork.components.rotation import LossyGear
+from shaftwork.components.mechanics import LossyGear
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import Diagnostic, NetworkError, ParameterError, SignalError
 from shaftwork.core.screen import in_columns

@@ -12,10 +12,9 @@ from shaftwork.components.base import Component
 from shaftwork.components.contacts import Backlash, TranslationalBacklash
 from shaftwork.components.laws import as_expression, omega, phi, s, v
 from shaftwork.components.loads import ViscousLoad
-from shaftwork.components.rotation import Damper, Inertia, Spring
+from shaftwork.components.mechanics import Damper, Inertia, Mass, Spring, TranslationalDamper, TranslationalSpring
 from shaftwork.components.sources import ForceSource, TorqueSource
 from shaftwork.components.tables import Table
-from shaftwork.components.translation import Mass, TranslationalDamper, TranslationalSpring
 from shaftwork.core.domains import ROTATION, TRANSLATION, Domain
 from shaftwork.core.errors import NetworkWarning, ShaftworkError
 from shaftwork.core.notices import muted

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from shaftwork.components.branches import INTEGRAL
-from shaftwork.components.rotation import Gear
+from shaftwork.components.mechanics import Gear
 from shaftwork.core.domains import ROTATION
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si

@@ -8,17 +8,14 @@ from typing import Any
 
 from shaftwork.components.base import Component
 from shaftwork.components.contacts import Backlash
-from shaftwork.components.drives import PullOutDrive
+from shaftwork.components.drives import PullOutDrive, motors
 from shaftwork.components.friction import Brake
 from shaftwork.components.loads import CoulombLoad, RandomLoad
-from shaftwork.components.motor_catalogue import motors
-from shaftwork.components.rotation import Inertia, Spring
-from shaftwork.components.translation import Mass, TranslationalSpring, Wheel
+from shaftwork.components.mechanics import Inertia, Mass, Spring, TranslationalSpring, Wheel
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
 from shaftwork.pipeline.network import Network
-from shaftwork.scenes.catalog import Scene, choice
-from shaftwork.scenes.reducer import DAMPING, GearStage, add_reducer, steel
+from shaftwork.scenes.catalog import DAMPING, GearStage, Scene, add_reducer, choice, steel
 
 MOTOR = motors["KBF-90 LA 2"]
 WHEEL_RADIUS = 0.125  # m

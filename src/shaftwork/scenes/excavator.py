@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from shaftwork.components.bucket_wheel import BucketWheelLoad, Soil
-from shaftwork.components.motor_catalogue import motors
+from shaftwork.components.drives import motors
+from shaftwork.components.mechanics import Gear, Inertia, Spring
 from shaftwork.components.motors import CageMotor
-from shaftwork.components.rotation import Gear, Inertia, Spring
 from shaftwork.core.errors import NetworkWarning
 from shaftwork.core.notices import muted
 from shaftwork.pipeline.network import Network
-from shaftwork.scenes.catalog import Scene
-from shaftwork.scenes.reducer import GearStage, add_reducer, steel
+from shaftwork.scenes.catalog import GearStage, Scene, add_reducer, steel
 
 T_DIG, T_END = 5.0, 30.0  # s: from then on it digs; end of figure 13
 PULL_UP_SPEED = 537.0  # 1/min, chosen: the one number with which the start has both of the extremes of figure 13

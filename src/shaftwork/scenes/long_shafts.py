@@ -10,7 +10,7 @@ from shaftwork.components.base import Component
 from shaftwork.components.bldc import BLDCMotor
 from shaftwork.components.laws import t
 from shaftwork.components.loads import CoulombLoad
-from shaftwork.components.rotation import Damper, Inertia, Spring
+from shaftwork.components.mechanics import Damper, Inertia, Spring
 from shaftwork.components.shaft_models import Lumped, ShaftModel, Spectral
 from shaftwork.components.shafts import Shaft
 from shaftwork.components.sources import TorqueSource

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from shaftwork.components.motor_catalogue import Nameplate
+from shaftwork.components.drives import Nameplate
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si, numbers_in_si
 from shaftwork.results.observer import RPM, Array

@@ -16,7 +16,7 @@ from shaftwork.components.base import Component
 from shaftwork.components.sources import SpeedSource
 from shaftwork.core.errors import ParameterError, SignalError
 from shaftwork.core.parameters import in_si
-from shaftwork.network.wording import at_nodes, listed
+from shaftwork.network.netlist import at_nodes, listed
 from shaftwork.results.course import LobattoPanels, turning_points
 from shaftwork.results.observer import Array, Read, blocks
 from shaftwork.results.solution import Solution

@@ -12,7 +12,7 @@ from scipy.optimize.elementwise import find_minimum
 
 from shaftwork.codegen.model_observer import ModelObserver
 from shaftwork.components.base import Component
-from shaftwork.components.rotation import Inertia
+from shaftwork.components.mechanics import Inertia
 from shaftwork.components.tables import Table, interpolate
 from shaftwork.core.errors import NetworkWarning, ParameterError, ShaftworkError
 from shaftwork.core.notices import muted

@@ -11,7 +11,7 @@ import sympy
 
 from shaftwork.components.laws import Ramp, Step
 from shaftwork.components.laws import t as TIME
-from shaftwork.components.rotation import Damper, Gear, Ground, Inertia, Spring
+from shaftwork.components.mechanics import Damper, Gear, Ground, Inertia, Spring
 from shaftwork.components.shaft_models import CentralDifference, Lumped, OneSpring, Rigid, ShaftModel, Spectral, Wave
 from shaftwork.components.shafts import Shaft
 from shaftwork.components.sources import TorqueSource

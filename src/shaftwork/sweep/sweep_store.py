@@ -21,7 +21,7 @@ from typing import Any, Self
 import numpy as np
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.network.wording import listed
+from shaftwork.network.netlist import listed
 from shaftwork.results.measures import Measure
 from shaftwork.sweep.sweep_task import Chunk, Reader, Task
 

@@ -19,11 +19,11 @@ from shaftwork.components.shaft_models import Lumped, Wave
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import AccuracyWarning, NetworkWarning, ParameterError
 from shaftwork.core.notices import warn
-from shaftwork.core.times import just_after
 from shaftwork.formulation.form import StateForm
 from shaftwork.integrate.problem import Problem, TimedProblem, Trajectory
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import Netlist
+from shaftwork.numerics.zeros import just_after
 from shaftwork.waves.delay_engine.collocation import POWERS
 from shaftwork.waves.delay_engine.engine import solve
 from shaftwork.waves.delay_engine.lines import DelayProblem, DelayTrajectory, Past, past_of

@@ -18,7 +18,7 @@ from shaftwork.components.discontinuities import bells, switches
 from shaftwork.components.law_slopes import jumps, slope
 from shaftwork.components.laws import t as TIME
 from shaftwork.formulation.form import StateForm
-from shaftwork.network.controlled import Reading, readings_of
+from shaftwork.network.graph import Reading, readings_of
 from shaftwork.network.kinds import Kind
 from shaftwork.network.templates import BranchTemplate
 

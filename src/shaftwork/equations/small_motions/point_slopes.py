@@ -15,8 +15,7 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ParameterError, no_quantity
 from shaftwork.equations.quantities import Quantities, is_rate
 from shaftwork.formulation.form import Names
-from shaftwork.network.controlled import readings_of
-from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch
+from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, readings_of
 from shaftwork.network.kinds import Kind
 
 if TYPE_CHECKING:

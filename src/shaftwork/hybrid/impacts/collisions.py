@@ -29,8 +29,8 @@ from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.state_transfer import Mobility, complementary
 from shaftwork.components.branches import ACROSS
 from shaftwork.components.modes import Leave
+from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import SimulationError
-from shaftwork.core.kept import Kept
 from shaftwork.hybrid.hybrid_state import CLEAR, NOTHING, HybridState, Regime
 from shaftwork.hybrid.impacts.impulses import NOTHING_OF, Blow, ImpactStage, ImpactStart, Impulses, summed
 from shaftwork.hybrid.modes.mode_equations import KEPT
@@ -163,7 +163,7 @@ class Collisions:
     def __init__(self, regimes: Regimes, impulses: Impulses, *, together: bool) -> None:
         self._regimes, self._elements = regimes, regimes.elements
         self._impulses, self._together = impulses, together
-        self._mobilities = Kept[tuple[Regime, tuple[tuple[int, int], ...]], Mobility](KEPT)
+        self._mobilities = BoundedCache[tuple[Regime, tuple[tuple[int, int], ...]], Mobility](KEPT)
 
     def impact(self, t: float, moment: HybridState, number: int, leave: Leave) -> Collision:
         """The impact of an element that closes.

@@ -24,8 +24,8 @@ from shaftwork.codegen.undefined_laws import first_missing, in_words, rough, wit
 from shaftwork.components.discontinuities import pieces_degree
 from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME
+from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import CompileError, SimulationError, no_value
-from shaftwork.core.kept import Kept
 from shaftwork.formulation.explicit_rows import Rows
 from shaftwork.formulation.form import Names
 from shaftwork.formulation.observables import NamedReadings, Observables
@@ -88,11 +88,11 @@ class ModeEquations:
         self._shown = ElementReadings(elements, self.parts, readings, self._parameters)
         if rows is None:
             _ = self._shown.function  # so that all quantities are known before any function of them is made
-        self._prepared = Kept[bytes, Prepared](KEPT)
-        self._matrices = Kept[LinearPart, ReadingMatrices](KEPT)
-        self._rates_by_p = Kept[bytes, tuple[RightSide, dict[str, Any]]](KEPT)
-        self._guards_by_p = Kept[bytes, GuardValues](KEPT)
-        self._translated = Kept[tuple[int, Expr], Expr](KEPT)
+        self._prepared = BoundedCache[bytes, Prepared](KEPT)
+        self._matrices = BoundedCache[LinearPart, ReadingMatrices](KEPT)
+        self._rates_by_p = BoundedCache[bytes, tuple[RightSide, dict[str, Any]]](KEPT)
+        self._guards_by_p = BoundedCache[bytes, GuardValues](KEPT)
+        self._translated = BoundedCache[tuple[int, Expr], Expr](KEPT)
         self._numbers = [self._places[element.number] for element in elements if element.number in self._places]
 
     def arriving(self, x: Array) -> dict[str, float]:  # noqa: ARG002

@@ -23,7 +23,7 @@ from shaftwork.codegen.array_form.matrices import LinearPart
 from shaftwork.codegen.compiled_model import ScalarProgram
 from shaftwork.components.discontinuities import parts
 from shaftwork.components.noise import HeldNoise, SmoothNoise
-from shaftwork.core.kept import Kept
+from shaftwork.core.calls import BoundedCache
 from shaftwork.formulation.form import StateForm
 from shaftwork.hybrid.modes.joints import HeldArrays, HeldRows, HeldStores, Joints, groups, held_places
 from shaftwork.hybrid.modes.mode_equations import ModeEquations, RightSide
@@ -65,7 +65,7 @@ class ReactionEquations(ModeEquations):
     def holding(self, numbers: tuple[int, ...]) -> ReactionEquations:
         """The equations in which the elements of these numbers hold."""
         other = copy(self)
-        caches: dict[str, Any] = {name: Kept(KEPT_RATES) for name in ("_guards_by_p", "_rates_by_p")}
+        caches: dict[str, Any] = {name: BoundedCache(KEPT_RATES) for name in ("_guards_by_p", "_rates_by_p")}
         laws = [law for k in numbers if (law := self._laws[k]) is not None]
         vars(other).update(_held=laws, _joints=None, _holds=None, **caches)
         return other
