@@ -32,7 +32,7 @@ FOLLOWING = {
     if entry.following is not None
 }
 """Engines that follow guards: the part of the tolerance that they run with, and the loosest one."""
-_ENGINES = ", ".join(name for name in FOLLOWING if name not in (ADAMS, "wave"))
+_ENGINES = ", ".join(sorted(name for name in FOLLOWING if name not in (ADAMS, "wave")))
 
 
 class Phases:
