@@ -165,6 +165,10 @@ class HeyokaProgram:
         """
         return self._values("switches", self.switches, t, x, parameters)
 
+    def guard_values(self, t: float, x: Array, parameters: Array) -> Array:
+        """Values of the guards (k,); arguments as for `switch_values`."""
+        return self._values("guards", self.guards, t, x, parameters)
+
     def slopes(self, t: float, x: Array, parameters: Array) -> Array:
         """Derivatives of the states (n,); arguments as for `switch_values`."""
         return self._values("rows", self.rows, t, x, parameters)

@@ -266,10 +266,7 @@ class _ExactDense:
 
     @cached_property
     def steps(self) -> Array:
-        """The nodes, and ever longer steps after the start of a piece: what fades fast there lies between some.
-
-        At a damping ratio of 1e4 the energy residual would be 2e-5 without them, where it is 2e-10.
-        """
+        """The nodes, and ever longer steps after the start of a piece: what fades fast there lies between some."""
         return np.unique(np.concatenate([self._graded(span.times) for span in self._spans]))
 
     def _graded(self, nodes: Array) -> Array:

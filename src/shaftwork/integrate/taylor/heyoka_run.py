@@ -25,6 +25,8 @@ INSIDE = (0.5, 0.9)
 DEFECT = 1e-8
 # What is the least that rounding moves a guard of size 1.
 ROUNDING = 8 * float(np.finfo(float).eps)
+# Part of its size by which a guard at the instant of a switch may be below its limit and be met by rounding.
+NEAR = 1e-12
 
 # From (integrator, step callback, step limit, longest step) to (outcome, its name, steps taken); called again after an
 # interruption. It returns to Python after some steps each, which changes them by rounding alone.
@@ -80,7 +82,7 @@ class TaylorRun:
             if outcome == "step_limit" and longest < math.inf and left > 1:
                 longest = math.inf
                 continue
-            self.met = self.program.guard_met(raw) if outcome == GUARD else None
+            self.met = self._guard_met(raw, outcome, watch)
             if self.met is None and outcome == "cb_stop" and watch is not None and watch.reason is None:
                 if watch.leaves:
                     settle(self.program, integrator, piece.end - piece.start)
@@ -111,6 +113,28 @@ class TaylorRun:
             offset = offsets[number]
             size = max(self._sizes[number], offset / ROUNDING)
             self._sides[number], self._offsets[number] = side / size, offset / size
+
+    def _guard_met(self, raw: Any, outcome: str, watch: SwitchWatch | None) -> int | None:
+        """The guard at which the run has stopped, by its own event or at that of a switch at the very same instant."""
+        if outcome == GUARD:
+            met: int | None = self.program.guard_met(raw)
+            return met
+        if watch is None or self.problem.guards is None or watch.reason is not None:
+            return None
+        time, state = self.integrator.time, self.integrator.state
+        beyond = self._beyond(time, state)
+        most = beyond.max(initial=-np.inf)
+        # a law that bends where a guard is met, as |i| does where a current ends, may hide it
+        if -NEAR < most <= 0.0 and outcome == "cb_stop":
+            ahead = NEAR * (self.problem.t_end - self.problem.t0)
+            later = self._beyond(time + ahead, state + ahead * self.program.slopes(time, state, self.integrator.pars))
+            beyond = np.where((beyond > -NEAR) & (later > beyond), later, -np.inf)
+        return int(np.argmax(beyond)) if beyond.max(initial=-np.inf) > 0.0 else None
+
+    def _beyond(self, time: float, state: Array) -> Array:
+        """How far the guards that are watched are beyond their limits, in parts of their sizes."""
+        values = self.program.guard_values(time, state, self.integrator.pars)
+        return np.where(self._sides == 0.0, -np.inf, self._sides * values - self._offsets)
 
     def _reacts(self, met: int) -> bool:
         """Whether the run goes on past the guard that it has met."""

@@ -16,6 +16,8 @@ CHATTER_STEPS, CHATTER_SPAN = 200, 1e-9
 WRONG_SIDE = 1e-9
 # What comes back on one side more slowly than at this part of the speed on the other may be a touch.
 BACK = 1e-3
+# How far rounding may have moved time and states, as a part of them.
+ROUNDINGS = 256 * float(np.finfo(float).eps)
 # Where in a trial step a switch that starts at zero is looked at: as early as it is not lost in rounding.
 EARLY = (1e-4, 1e-2, 1e-1)
 
@@ -44,6 +46,12 @@ def settle(program: Any, integrator: Any, horizon: float) -> None:
         signs[:] = timed
         return
     signs[:] = program.switch_signs(integrator.time, integrator.state, parameters, timed * program.timed)
+    if (near := _within_rounding(program, integrator) & ~program.timed).any():
+        before = signs.copy()
+        signs[near] = 0.0
+        early = _early_signs(program, integrator, horizon)
+        signs[:] = np.where(near & (early != 0.0), early, before)
+        _enter(program, integrator, signs)
     for _ in range(signs.size):
         zero = (signs == 0.0) & ~program.timed
         if not zero.any():
@@ -61,6 +69,16 @@ def _enter(program: Any, integrator: Any, signs: Array) -> None:
         for number in program.held.by_switch:
             if signs[number] < 0:
                 program.step(number, integrator)
+
+
+def _within_rounding(program: Any, integrator: Any) -> NDArray[np.bool_]:
+    """The switches whose side rounding decides: those at which another event has just ended a run."""
+    time, state, parameters = integrator.time, integrator.state, integrator.pars
+    values = program.switch_values(time, state, parameters)
+    moved = state * (1.0 + ROUNDINGS * np.where(np.arange(state.size) % 2, 1.0, -1.0))
+    others = program.switch_values(time + ROUNDINGS * abs(time), moved, parameters)
+    with np.errstate(invalid="ignore"):  # one that is infinite is not near zero
+        return np.asarray((values != 0.0) & (np.abs(values) <= np.abs(others - values)))
 
 
 def _early_signs(program: Any, integrator: Any, horizon: float) -> Array:
