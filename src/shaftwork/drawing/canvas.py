@@ -11,12 +11,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from shaftwork.core.domains import ROTATION
-from shaftwork.core.errors import ParameterError
+from shaftwork.core.errors import MissingExtraError, ParameterError
 from shaftwork.drawing.items import Item
 from shaftwork.drawing.layout import HALF, LINE, Box, Placement, Spot
 from shaftwork.drawing.placement import placed
 from shaftwork.drawing.strokes import THICK, THIN, Stroke, Text, circle, line, moved, rectangle
 from shaftwork.drawing.symbols import EARTH, FRAME, LENGTH, WHITE
+from shaftwork.equations.spelling import in_text
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.results.plotting import new_figure
 
@@ -179,9 +180,8 @@ def _tikz_stroke(stroke: Stroke) -> str:
 
 def _tikz_text(text: Text) -> str:
     anchor = {"left": "base west", "centre": "base", "right": "base east"}[text.anchor]
-    words = "$".join(
-        piece if k % 2 else re.sub(r"([#%&_{}$])", r"\\\1", piece) for k, piece in enumerate(text.words.split("$"))
-    )
+    pieces = re.split(r"(?<!\\)\$", text.words)
+    words = "$".join(piece if k % 2 else in_text(piece.replace(r"\$", "$")) for k, piece in enumerate(pieces))
     return rf"\node[anchor={anchor}, inner sep=0pt] at ({text.at[0]:.2f},{text.at[1]:.2f}) {{{words}}};"
 
 
@@ -192,11 +192,14 @@ def width_of(words: str, size: float = SIZE) -> float:
     Raises:
         MissingExtraError: matplotlib is not installed.
     """
-    new_figure("Network.draw()", 1.0, 1.0)
-    from matplotlib.font_manager import FontProperties
-    from matplotlib.textpath import TextToPath
-
-    return float(TextToPath().get_text_width_height_descent(words, FontProperties(size=size), "$" in words)[0])
+    try:
+        from matplotlib.font_manager import FontProperties
+        from matplotlib.textpath import TextToPath
+    except ImportError:
+        raise MissingExtraError("matplotlib", "plot", "Network.draw()") from None
+    formula = re.search(r"(?<!\\)\$", words) is not None
+    shown = words if formula else words.replace(r"\$", "$")
+    return float(TextToPath().get_text_width_height_descent(shown, FontProperties(size=size), formula)[0])
 
 
 def box_of(text: Text) -> tuple[float, float, float, float]:
@@ -233,6 +236,7 @@ def _groups(result: Placement, graph: CircuitGraph, *, train: bool) -> Iterator[
     for box in result.boxes:
         frame = rectangle(box.left, box.middle - HALF, box.right, box.middle + HALF, WHITE)
         yield DrawnGroup(f"part {box.item.part}", (frame,), tuple(_box_texts(box)))
+    yield DrawnGroup("ends", (), tuple(result.pins))
 
 
 def _symbol(spot: Spot) -> Iterator[Stroke]:
@@ -256,4 +260,4 @@ def _texts(spot: Spot) -> Iterator[Text]:
 
 
 def _box_texts(box: Box) -> Iterator[Text]:
-    yield Text(((box.left + box.right) / 2, box.middle - 3.5), box.item.lines[0])
+    yield Text(((box.left + box.right) / 2, box.middle - 15.0), box.item.lines[0])

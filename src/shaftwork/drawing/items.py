@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from shaftwork.core.domains import ELECTRICAL
 from shaftwork.drawing.symbols import CIRCUIT, TRAIN, Shape
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
 from shaftwork.network.kinds import Kind
 
 End = int
 """The number of a node; `GROUND` is the frame or the reference."""
+MOST_LETTERS, MOST_VALUES = 2, 4
+"""Parameters of a part whose letters stand beside it, and whose values do; one of more has its name alone."""
 MOST_ELEMENTS = 4
 """Elements of a part beyond which its circuit is one box: a shaft of many elements, a machine with windings."""
 
@@ -26,6 +28,7 @@ SHAPES: Mapping[str, str] = {
     "Gear": "gear",
     "LossyGear": "gear",
     "PlanetaryGear": "planetary gear",
+    "Ground": "wire",
     "Drum": "rack",
     "Wheel": "rack",
     "TorqueSource": "torque",
@@ -67,12 +70,14 @@ class Item:
         shape: the symbol.
         ends: the nodes that it joins, in the order of its ends.
         lines: of text beside it, with formulas between dollar signs.
+        ports: of a part with more than two ends the name of each, by node.
     """
 
     part: str
     shape: Shape
     ends: tuple[End, ...]
     lines: tuple[str, ...]
+    ports: Mapping[End, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -91,57 +96,77 @@ class Letters:
     values: bool
     modes: Mapping[str, str]
 
-    def of_mode(self, part: GraphPart) -> Iterator[str]:
+    def of_name(self, part: GraphPart) -> Iterator[str]:
         """The name of a part, and its mode where a phase is drawn."""
-        yield part.name
-        if part.name in self.modes:
-            yield self.modes[part.name]
+        yield plain(part.name)
+        yield from self._mode(part)
 
     def of_part(self, part: GraphPart) -> Iterator[str]:
-        """One or two parameters that are numbers, times left out; of more, or none, the name of the part."""
+        """The parameters of a part, times left out, if they are few; else its name."""
         declared = part.component.declared
         names = [name for name in part.parameters if name in declared and declared[name].unit != "s"]
-        if len(names) not in (1, 2):
-            yield part.name
+        letters = [self._letter(part, name) for name in names]
+        if not names or len(names) > (MOST_VALUES if self.values else MOST_LETTERS) or not all(letters):
+            yield plain(part.name)
         elif self.values:
-            for name in names:
-                letter, number = self._letter(part, name), self.graph.parameters[f"{part.name}.{name}"]
-                yield f"${letter} = {_number(number)}$ {_unit(declared[name].unit)}".strip()
+            if len(names) > MOST_LETTERS:
+                yield plain(part.name)
+            for name, letter in zip(names, letters, strict=True):
+                yield _valued(letter, self.graph.parameters[f"{part.name}.{name}"], declared[name].unit)
         else:
-            yield ", ".join(f"${self._letter(part, name)}$" for name in names)
-        if part.name in self.modes:
-            yield self.modes[part.name]
+            yield ", ".join(f"${letter}$" for letter in letters)
+        yield from self._mode(part)
 
     def of_branch(self, branch: GraphBranch, part: GraphPart) -> Iterator[str]:
         """The parameter that a law is alone, of springs and dampers its inverse; else the name of the part."""
         law, kind = branch.template.law, branch.template.kind
-        symbol = next((symbol for symbol in law.free_symbols if law in (symbol, 1 / symbol)), None)
-        if symbol is None or symbol.name not in part.parameters:
-            yield part.name
-            return
-        name, inverse = symbol.name, law == symbol and kind in (Kind.THROUGH_STORE, Kind.CONDUCTANCE)
-        letter, declared = self._letter(part, name), part.component.declared.get(name)
-        if inverse or not self.values or declared is None:
+        symbol = next((symbol for symbol in law.free_symbols if law in (symbol, -symbol, 1 / symbol)), None)
+        name = "" if symbol is None or symbol.name not in part.component.declared else symbol.name
+        letter = self._letter(part, name) if name in part.parameters else ""
+        inverse = law == symbol and kind in (Kind.THROUGH_STORE, Kind.CONDUCTANCE)
+        if not letter:
+            yield plain(part.name)
+        elif not self.values:
             yield f"$1/{letter}$" if inverse else f"${letter}$"
-        if self.values and declared is not None:
-            yield f"${letter} = {_number(self.graph.parameters[f'{part.name}.{name}'])}$ {_unit(declared.unit)}".strip()
+        else:
+            number, unit = self.graph.parameters[f"{part.name}.{name}"], part.component.declared[name].unit
+            yield _valued(f"1/{letter}", 1 / number, _inverse(unit)) if inverse else _valued(letter, number, unit)
+        if branch.index == part.branches[0]:
+            yield from self._mode(part)
+
+    def _mode(self, part: GraphPart) -> Iterator[str]:
+        if part.name in self.modes:
+            yield self.modes[part.name]
 
     def _letter(self, part: GraphPart, name: str) -> str:
-        return self.latex[f"{part.name}.{name}"].translate(MARKS)
+        """The letter of a parameter, or nothing where its subscript has signs that cannot be drawn."""
+        letter = self.latex.get(f"{part.name}.{name}", "").translate(MARKS)
+        return letter if DRAWABLE.fullmatch(letter) else ""
 
 
 MARKS = dict.fromkeys(range(0xE000, 0xF900))
 """Characters without a picture, by which the printer of equations marks numbers."""
+DRAWABLE = re.compile(r"(?:[A-Za-z0-9,.()'{}_^ -]|\\(?:[A-Za-z]+|[ ,_%#]))+")
+"""Formulas of which every sign can be drawn."""
 
 
-def _number(value: float) -> str:
-    """A number in at most five digits, with a power of ten where it is very large or small."""
+def plain(name: str) -> str:
+    """A name as a text that holds no formula."""
+    return name.replace("$", r"\$")
+
+
+def _valued(letter: str, value: float, unit: str) -> str:
+    """A letter with its number, in at most five digits and with a power of ten where it is very large or small."""
     mantissa, _, exponent = f"{value:.5g}".partition("e")
-    return mantissa + (rf" \cdot 10^{{{int(exponent)}}}" if exponent else "")
+    number = mantissa + (rf" \cdot 10^{{{int(exponent)}}}" if exponent else "")
+    shown = "" if unit == "1" else unit.replace("*", " ").replace("^2", "²").replace("^3", "³")
+    return f"${letter} = {number}$ {shown}".strip()
 
 
-def _unit(unit: str) -> str:
-    return "" if unit == "1" else unit.replace("*", " ").replace("^2", "²").replace("^3", "³")
+def _inverse(unit: str) -> str:
+    """The unit of the inverse of a quantity: "rad/(N*m)" of "N*m/rad"."""
+    above, _, below = unit.partition("/")
+    return f"{below or 1}/({above})" if "*" in above else f"{below or 1}/{above}"
 
 
 def train_items(letters: Letters) -> Iterator[Item]:
@@ -149,21 +174,34 @@ def train_items(letters: Letters) -> Iterator[Item]:
     for part in letters.graph.parts:
         ends = tuple(part.nodes[port.name] for port in part.component.ports)
         if set(ends) != {GROUND}:
-            yield Item(part.name, train_shape(part, letters.graph), ends, tuple(letters.of_part(part)))
+            shape = train_shape(part, letters.graph)
+            lines = () if shape is TRAIN["wire"] else tuple(letters.of_part(part))
+            yield Item(part.name, shape, ends, lines, names_of(part))
+
+
+def names_of(part: GraphPart) -> dict[End, str]:
+    """The port at each node of a part."""
+    return {part.nodes[port.name]: plain(port.name) for port in part.component.ports}
 
 
 def train_shape(part: GraphPart, graph: CircuitGraph) -> Shape:
     """The symbol of a part: that of its class, or of the nearest class above that has one, or of its role."""
-    component = part.component
-    for kind in type(component).__mro__:
-        if kind.__name__ in SHAPES:
-            name = SHAPES[kind.__name__]
-            if name == "spring" and any(graph.branches[k].template.kind is Kind.CONDUCTANCE for k in part.branches):
-                name = "spring and damper"
-            return TRAIN[name]
+    component, name = part.component, symbol_of(part)
+    if name == "spring" and any(graph.branches[k].template.kind is Kind.CONDUCTANCE for k in part.branches):
+        name = "spring and damper"
+    if name == "gear" and abs(graph.parameters.get(f"{part.name}.ratio", 1.0)) < 1.0:
+        name = "gear up"
+    if name:
+        return TRAIN[name]
     if len(component.ports) == 1 and component.role == "store":
         return TRAIN["disc"]
     return TRAIN[BY_ROLE[component.role] if len(component.ports) <= 2 else "box"]
+
+
+def symbol_of(part: GraphPart) -> str:
+    """The symbol of the class of a part, or of the nearest class above that has one; empty where there is none."""
+    names = (kind.__name__ for kind in type(part.component).__mro__)
+    return next((SHAPES[name] for name in names if name in SHAPES), "")
 
 
 def circuit_items(letters: Letters) -> Iterator[Item]:
@@ -173,13 +211,12 @@ def circuit_items(letters: Letters) -> Iterator[Item]:
         ports = tuple(part.nodes[port.name] for port in part.component.ports)
         branches = [graph.branches[k] for k in part.branches]
         inner = any(node not in (*ports, GROUND) for branch in branches for node in nodes_of(branch))
-        if len(branches) > MOST_ELEMENTS or inner:
-            shape = CIRCUIT["line" if SHAPES.get(type(part.component).__name__) == "shaft" else "box"]
-            yield Item(part.name, shape, ports, (part.name,))
-            continue
-        if SHAPES.get(type(part.component).__name__) == "diode" or not branches:
-            shape = CIRCUIT["diode" if part.component.ports[0].domain is ELECTRICAL else "break"]
-            yield Item(part.name, shape, (*ports, GROUND)[:2], tuple(letters.of_mode(part)))
+        symbol = symbol_of(part)
+        whole = "line" if symbol == "shaft" else "box" if len(branches) > MOST_ELEMENTS or inner else ""
+        whole = whole or ("diode" if symbol in ("diode", "freewheel") else "" if branches else "break")
+        if whole:
+            ends = (*ports, GROUND)[: max(2, len(ports))]
+            yield Item(part.name, CIRCUIT[whole], ends, tuple(letters.of_name(part)), names_of(part))
             continue
         for branch in branches:
             yield from _elements(branch, part, letters)
@@ -197,9 +234,11 @@ def _elements(branch: GraphBranch, part: GraphPart, letters: Letters) -> Iterato
     if kind is Kind.COUPLING:
         yield from _coupling(branch, part, letters)
     elif branch.plus != branch.minus:
-        active = part.component.role == "source"
-        shape = ELEMENTS.get(kind, "current" if active else "nonlinear")
-        if kind is Kind.THROUGH_SOURCE and part.component.role == "loss":
+        template, role = branch.template, part.component.role
+        shape = ELEMENTS.get(kind, "current" if role == "source" else "nonlinear")
+        if kind is Kind.LAW and template.has_integral and role != "source":
+            shape = "nonlinear inductor"
+        if kind is Kind.THROUGH_SOURCE and role == "loss" and not template.conservative:
             shape = "nonlinear"
         lines = letters.of_branch(branch, part)
         yield Item(part.name, CIRCUIT[shape], (branch.plus, branch.minus), tuple(lines))
@@ -207,11 +246,24 @@ def _elements(branch: GraphBranch, part: GraphPart, letters: Letters) -> Iterato
 
 def _coupling(branch: GraphBranch, part: GraphPart, letters: Letters) -> Iterator[Item]:
     """A transformer for a gear between two nodes, a closed contact for a rigid joint, else a box."""
-    pairs = [(plus, minus) for _, plus, minus in branch.terms if plus != minus]
-    if len(pairs) == 1:
-        yield Item(part.name, CIRCUIT["contact"], pairs[0], tuple(letters.of_mode(part)))
-    elif len(pairs) == 2 and all(minus == GROUND for _, minus in pairs):
-        lines = tuple(letters.of_part(part))
-        yield Item(part.name, CIRCUIT["transformer"], (pairs[0][0], pairs[1][0]), lines)
-    elif pairs:
-        yield Item(part.name, CIRCUIT["box"], tuple(dict.fromkeys(n for pair in pairs for n in pair)), (part.name,))
+    terms = [term for term in branch.terms if term[1] != term[2]]
+    if len(terms) == 1:
+        ground = symbol_of(part) == "wire"
+        lines = () if ground else tuple(letters.of_name(part))
+        yield Item(part.name, CIRCUIT["wire" if ground else "contact"], terms[0][1:], lines)
+    elif len(terms) == 2 and all(minus == GROUND for _, _, minus in terms):
+        (first, node, _), (second, other, _) = terms
+        values = {
+            symbol: letters.graph.parameters[f"{part.name}.{symbol.name}"] for symbol in (first * second).free_symbols
+        }
+        same = float((first * second).subs(values)) < 0.0
+        shape = CIRCUIT["transformer" if same else "reversing transformer"]
+        yield Item(part.name, shape, (node, other), tuple(letters.of_part(part)))
+    elif terms:
+        yield Item(
+            part.name,
+            CIRCUIT["box"],
+            tuple(dict.fromkeys(node for _, *pair in terms for node in pair)),
+            tuple(letters.of_part(part)),
+            names_of(part),
+        )

@@ -17,13 +17,15 @@ import networkx as nx
 import numpy as np
 
 from shaftwork.drawing.items import End, Item
-from shaftwork.drawing.strokes import Point
+from shaftwork.drawing.strokes import Point, Text
 from shaftwork.network.graph import GROUND
 
 SPACE = 8.0
 """Between things that must not touch, pt."""
 RISE = 10.0
 """Between lines that rise side by side, pt."""
+SMALL = 7.0
+"""Letters of the names of ends, pt."""
 LINE = 13.0
 """Height of a line of text, pt."""
 HALF = 20.0
@@ -74,6 +76,7 @@ class Placement:
         leads: by node, lines to what hangs from it.
         dots: by node, where more than two lines meet.
         grounds: where the frame or the reference begins.
+        pins: names of the ends of boxes.
     """
 
     spots: list[Spot] = field(default_factory=list)
@@ -82,6 +85,7 @@ class Placement:
     leads: dict[End, list[tuple[Point, ...]]] = field(default_factory=lambda: defaultdict(list))
     dots: dict[End, list[Point]] = field(default_factory=lambda: defaultdict(list))
     grounds: list[Point] = field(default_factory=list)
+    pins: list[Text] = field(default_factory=list)
 
     def take(self, other: Placement, y: float) -> None:
         """Add what another has, at another height."""
@@ -94,6 +98,7 @@ class Placement:
         for node, points in other.dots.items():
             self.dots[node] += [_up(point, y) for point in points]
         self.grounds += [_up(point, y) for point in other.grounds]
+        self.pins += [replace(text, at=_up(text.at, y)) for text in other.pins]
 
 
 def _up(point: Point, y: float) -> Point:

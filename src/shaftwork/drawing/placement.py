@@ -12,14 +12,17 @@ from shaftwork.drawing.layout import (
     LEAD,
     LINE,
     RISE,
+    SMALL,
     SPACE,
     WIDTH,
     Box,
+    Joint,
     Layout,
     Placement,
     Spot,
     Station,
 )
+from shaftwork.drawing.strokes import Point, Text
 from shaftwork.drawing.symbols import LENGTH
 from shaftwork.network.graph import GROUND
 
@@ -86,7 +89,7 @@ class _Placing:
                 x = 0.0
 
     def _text_width(self, item: Item) -> float:
-        return max(map(self.layout.width_of, item.lines))
+        return max(map(self.layout.width_of, item.lines), default=0.0)
 
     def _rising(self, place: int, side: int) -> list[int]:
         """The joints above the line that leave a station to a side (-1 left, 1 right), from left to right."""
@@ -144,10 +147,12 @@ class _Placing:
     def _box(self, place: int, station: Station, x: float, row: _Row) -> float:
         item = self.layout.boxes[station]
         rising = [*self._rising(place, -1), *self._rising(place, 1)]
-        width = max(2 * HALF, RISE * (len(rising) + 1), self._text_width(item) + SPACE)
-        start = x + (width - RISE * (len(rising) - 1)) / 2
+        name = max(map(self.layout.width_of, item.ports.values()), default=0.0)
+        apart = max(RISE, name + 3.0)
+        width = max(2 * HALF, 2 * name + SPACE, apart * (len(rising) + 1), self._text_width(item) + SPACE)
+        start = x + (width - apart * (len(rising) - 1)) / 2
         for k, number in enumerate(rising):
-            self.leaves[number, station] = start + RISE * k
+            self.leaves[number, station] = start + apart * k
         row.result.boxes.append(Box(item, x, x + width, 0.0))
         row.above, row.below = max(row.above, HALF), max(row.below, HALF)
         if GROUND in item.ends:
@@ -192,12 +197,24 @@ class _Placing:
             first, last = ([(x, foot), (x, y)] for x, foot in zip(xs, feet, strict=True))
         if joint.item is None:
             row.result.wires[joint.node].append((*first, *reversed(last)))
+            self._pin(joint, first, last, row)
             return
         x = (begin + end - LENGTH) / 2
         row.result.wires[left[1]].append((*first, (x, y)))
         row.result.wires[right[1]].append((*last, (x + LENGTH, y)))
         label = (x + LENGTH / 2, y + joint.item.shape.above + 3.0)
         row.result.spots.append(Spot(joint.item, (x, y), label, mirrored=left != joint.first))
+
+    def _pin(self, joint: Joint, first: list[Point], last: list[Point], row: _Row) -> None:
+        """The name of the end of a box at which a wire comes in: inside, beside the wire."""
+        left = self.layout.place[joint.second] < self.layout.place[joint.first]
+        (x, y), rises = (first if left else last)[0], len(first) > 1
+        words = self.layout.boxes[joint.second].ports[joint.node]
+        if rises:
+            row.result.pins.append(Text((x, y - 9.0), words, "centre", SMALL))
+        else:
+            beside = (x - 3.0, y + 2.0) if left else (x + 3.0, y + 2.0)
+            row.result.pins.append(Text(beside, words, "right" if left else "left", SMALL))
 
     def _wires(self) -> None:
         """The line of each node along its row, with dots where more than two lines meet."""

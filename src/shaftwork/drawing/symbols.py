@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from shaftwork.drawing.strokes import Point, Stroke, arc, area, arrow, circle, line, rectangle
 
@@ -22,7 +22,6 @@ class Shape:
         above, below: how far it reaches up and down, pt.
         mark: letters in its middle.
         on_line: whether it sits on a shaft line, with its middle at x = 0, and not between two ends.
-        grounded: whether it stands on the frame by itself, as the windings of a transformer do.
     """
 
     strokes: tuple[Stroke, ...]
@@ -30,7 +29,6 @@ class Shape:
     below: float = 14.0
     mark: str = ""
     on_line: bool = False
-    grounded: bool = False
 
 
 def _leads(left: float, right: float) -> tuple[Stroke, Stroke]:
@@ -87,6 +85,10 @@ def _gear() -> Shape:
     return Shape((*_leads(left, right), *wheels, *teeth), 16.0, 16.0)
 
 
+def _mirrored(shape: Shape) -> Shape:
+    return replace(shape, strokes=tuple(stroke.mirrored(LENGTH) for stroke in shape.strokes))
+
+
 def _coil(start: Point, along: Point, turns: int, radius: float, side: int) -> tuple[Stroke, ...]:
     """Half circles in a row."""
     strokes = []
@@ -98,8 +100,8 @@ def _coil(start: Point, along: Point, turns: int, radius: float, side: int) -> t
     return tuple(strokes)
 
 
-def _transformer() -> Shape:
-    """Two windings that hang from the line, each with its foot on the frame."""
+def _transformer(*, reversing: bool = False) -> Shape:
+    """Two windings that hang from the line, each with its foot on the frame; dots say where both are positive."""
     left, right, top, radius = MIDDLE - 9.0, MIDDLE + 9.0, -4.0, 4.0
     foot = top - 6 * radius
     strokes: list[Stroke] = [
@@ -110,11 +112,11 @@ def _transformer() -> Shape:
         line((MIDDLE - 1.5, top), (MIDDLE - 1.5, foot)),
         line((MIDDLE + 1.5, top), (MIDDLE + 1.5, foot)),
         circle((left - 4, top - 1), 1.2, 0.0),
-        circle((right + 4, top - 1), 1.2, 0.0),
+        circle((right + 4, foot + 1 if reversing else top - 1), 1.2, 0.0),
     ]
     for x in (left, right):
         strokes += [line((x, foot), (x, foot - 4)), *(stroke.moved((x, foot - 4)) for stroke in EARTH)]
-    return Shape(tuple(strokes), 4.0, 44.0, grounded=True)
+    return Shape(tuple(strokes), 4.0, 44.0)
 
 
 EARTH = (
@@ -129,6 +131,8 @@ FRAME = (
 )
 """The frame, below the point where it begins."""
 
+_PLUS = (line((6.0, 7.0), (12.0, 7.0)), line((9.0, 4.0), (9.0, 10.0)))
+"""At the first end of what prescribes a voltage or a speed."""
 _NONLINEAR = line((MIDDLE - 12.0, -11.0), (MIDDLE - 7.0, -11.0), (MIDDLE + 12.0, 11.0))
 
 CIRCUIT: Mapping[str, Shape] = {
@@ -137,8 +141,13 @@ CIRCUIT: Mapping[str, Shape] = {
     "resistor": _box(half=14.0, height=5.5),
     "nonlinear": Shape((*_box(half=14.0, height=5.5).strokes, _NONLINEAR), 12.0, 12.0),
     "current": _round("", *arrow((MIDDLE + 8.0, 0.0), (MIDDLE - 8.0, 0.0))),
-    "voltage": _round("", line((MIDDLE - 12.0, 0.0), (MIDDLE + 12.0, 0.0))),
+    "voltage": _round("", line((MIDDLE - 12.0, 0.0), (MIDDLE + 12.0, 0.0)), *_PLUS),
     "transformer": _transformer(),
+    "reversing transformer": _transformer(reversing=True),
+    "wire": Shape((line((0.0, 0.0), (LENGTH, 0.0)),), 2.0, 2.0),
+    "nonlinear inductor": Shape(
+        (*_leads(11.0, 43.0), *_coil((11.0, 0.0), (1.0, 0.0), 4, 4.0, 1), _NONLINEAR), 12.0, 12.0
+    ),
     "line": Shape(
         (
             *_leads(10.0, 44.0),
@@ -199,11 +208,13 @@ TRAIN: Mapping[str, Shape] = {
         6.0,
     ),
     "gear": _gear(),
+    "gear up": _mirrored(_gear()),
     "planetary gear": _box("P", half=13.0, height=13.0),
     "rack": Shape((*_leads(18.0, 36.0), circle((MIDDLE, 3.0), 9.0, GREY), line((14.0, -6.0), (40.0, -6.0))), 14.0, 8.0),
     "motor": _round("M"),
     "torque": _round("", *arrow((MIDDLE + 8.0, 0.0), (MIDDLE - 8.0, 0.0))),
-    "speed": _round(r"$\omega$"),
+    "speed": _round(r"$\omega$", *_PLUS),
+    "wire": CIRCUIT["wire"],
     "load": Shape(
         (
             *_leads(MIDDLE - 14, MIDDLE + 14),
@@ -219,19 +230,14 @@ TRAIN: Mapping[str, Shape] = {
         rectangle(MIDDLE + 2.5, -11.0, MIDDLE + 7.0, 11.0, GREY),
         gap=14.0,
     ),
-    "clutch": _plates(gap=6.0),
+    "clutch": _plates(
+        rectangle(MIDDLE - 6.0, -12.0, MIDDLE - 2.0, 12.0, GREY),
+        rectangle(MIDDLE + 2.0, -12.0, MIDDLE + 6.0, 12.0, GREY),
+        gap=12.0,
+    ),
     "freewheel": _plates(area((MIDDLE - 6.0, 7.0), (MIDDLE - 6.0, -7.0), (MIDDLE + 6.0, 0.0), fill=WHITE), gap=12.0),
-    "gap": Shape(
-        (
-            *_leads(17.0, 37.0),
-            line((17.0, -9.0), (17.0, 9.0)),
-            line((17.0, 9.0), (29.0, 9.0)),
-            line((17.0, -9.0), (29.0, -9.0)),
-            line((25.0, 0.0), (37.0, 0.0)),
-            line((25.0, -4.5), (25.0, 4.5)),
-        ),
-        11.0,
-        11.0,
+    "gap": _plates(
+        *arrow((MIDDLE, 0.0), (MIDDLE - 8.0, 0.0), 4.0), *arrow((MIDDLE, 0.0), (MIDDLE + 8.0, 0.0), 4.0), gap=16.0
     ),
     "stop": Shape(
         (*_leads(20.0, 34.0), line((20.0, -8.0), (20.0, 8.0)), rectangle(30.0, -8.0, 34.0, 8.0, GREY)), 10.0, 10.0

@@ -12,7 +12,7 @@ from sympy import Expr, Float, Symbol
 from shaftwork.components.base import Derived
 from shaftwork.core.domains import ELECTRICAL, Quantity
 from shaftwork.core.parameters import Parameter
-from shaftwork.equations.notations import Letter, Notation
+from shaftwork.equations.notations import Letter, Notation, parted
 from shaftwork.equations.quantities import Quantities, ThroughQuantity, running_number
 from shaftwork.equations.spelling import GREEK, chosen_subscript, escaped, indexed, split_index, without_marks
 from shaftwork.formulation.form import StateForm
@@ -108,8 +108,7 @@ def _parts(form: StateForm, quantities: Quantities, source: Notation) -> Iterato
 def parameter_letters(part: str, declarations: Iterable[Parameter | Derived]) -> Iterator[Letter]:
     """The letters of parameters and of what is derived from them."""
     for declared in declarations:
-        base, _, mark = declared.latex.partition("_")
-        mark = mark[1:-1] if mark.startswith("{") and mark.endswith("}") else mark
+        base, mark = parted(declared.latex)
         yield Letter(
             f"{part}.{declared.name}", _upright(base), _upright(mark), declared.unit, declared.meaning, parameter=True
         )

@@ -117,8 +117,14 @@ class Notation:
 
 
 def _spelt(letter: Letter, latex: str) -> Letter:
+    base, mark = parted(latex)
+    return replace(letter, base=base, mark=mark)
+
+
+def parted(latex: str) -> tuple[str, str]:
+    """A letter and its subscript without the braces around it."""
     base, _, mark = latex.partition("_")
-    return replace(letter, base=base, mark=mark.removeprefix("{").removesuffix("}"))
+    return base, mark[1:-1] if mark.startswith("{") and mark.endswith("}") else mark
 
 
 def inverses_of(letters: Iterable[Letter]) -> dict[Symbol, Symbol]:

@@ -349,6 +349,7 @@ class HybridRun:
             del self.changes[noted:]
             self._soon = [*soon]
             passing = InPlaceEvents(self.settling, moment, t, self.note)
+            problem = changed(problem, react=passing)
         if sticks is not None and len(tried) > 1:
             raise sticks
         return self._solve(problem, last, why if failed is None else choice.no_series(failed, last)), passing

@@ -228,8 +228,8 @@ class Problem(TimedProblem):
         react: how the run goes on past guards, or None where each of them ends it.
         linear: the same system in linear form, where it is one; else None.
         observed: all quantities of a linear network, or None.
-        symbolic: the same system as a heyoka program with its parameters (`codegen.heyoka.BoundProgram`), a function
-            that makes this where an engine asks for it, or None where there is none.
+        symbolic: the same system as a heyoka program with its parameters (`codegen.taylor.heyoka.BoundProgram`), a
+            function that makes this where an engine asks for it, or None where there is none.
         rough: from times (k,) and states (k, n) to the first time at which any part of a law has no value or no slope,
             be it in a branch that does not hold, and that law in words.
         overall: the size of the largest state where it stays below one: so much smaller is a tolerance for all states.

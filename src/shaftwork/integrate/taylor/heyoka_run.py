@@ -115,7 +115,11 @@ class TaylorRun:
             self._sides[number], self._offsets[number] = side / size, offset / size
 
     def _guard_met(self, raw: Any, outcome: str, watch: SwitchWatch | None) -> int | None:
-        """The guard at which the run has stopped, by its own event or at that of a switch at the very same instant."""
+        """The guard at which the run has stopped, by its own event or at that of a switch at the very same instant.
+
+        Without the second, scipy takes over a motor under current control: 2.5 times the steps, and an energy residual
+        of 6e-9 instead of 8e-13.
+        """
         if outcome == GUARD:
             met: int | None = self.program.guard_met(raw)
             return met

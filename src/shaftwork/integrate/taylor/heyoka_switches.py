@@ -34,7 +34,7 @@ def settle(program: Any, integrator: Any, horizon: float) -> None:
     spring without twist) takes the sign that it has early in a trial step; it stays at zero when it rests there.
 
     Args:
-        program: a `codegen.heyoka.HeyokaProgram`.
+        program: a `codegen.taylor.heyoka.HeyokaProgram`.
         integrator: its integrator; time and state are left as they were.
         horizon: length of the piece, or of the rest of it, in s.
     """
@@ -114,7 +114,7 @@ def keeps_sides(program: Any, integrator: Any, parameters: Array, start: float) 
     of an angle from rest does.
 
     Args:
-        program: a `codegen.heyoka.HeyokaProgram`.
+        program: a `codegen.taylor.heyoka.HeyokaProgram`.
         integrator: its integrator after a step with its Taylor coefficients kept.
         parameters: all parameters before the step, the signs included.
         start: of the step, s.
@@ -130,7 +130,7 @@ class SwitchWatch:
     """Step callback of a run with switches: stops it when a switch is not on the side that its sign says.
 
     Args:
-        program: a `codegen.heyoka.HeyokaProgram`.
+        program: a `codegen.taylor.heyoka.HeyokaProgram`.
         start: where the run starts, s.
         duration: length of the whole run in s.
         size: (switches,) of the switches at the start.
