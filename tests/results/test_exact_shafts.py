@@ -526,3 +526,13 @@ def test_random_trains_are_those_of_a_converged_mesh(shafts: list[Any], ratio: f
     assert len(exact) == len(mesh)
     size = np.abs(mesh.rates).max(initial=1.0)
     np.testing.assert_allclose(exact.rates, mesh.rates, rtol=1e-9, atol=1e-12 * size)  # slow ones drown in its rounding
+
+
+@pytest.mark.parametrize("count", [2, 3, 5, 8])
+def test_shapes_of_a_damped_shaft_move_its_ends_as_their_nodes_do(count: int) -> None:
+    """J d(omega)/dt = tau, and the speed of the shaft at its end is that of the inertia there."""
+    modes = _train(sw.Lumped(8), damping=2e-3).modes(exact=True, count=count)
+    swings = modes.rates.imag > 0
+    speed, torque = modes.shapes["Je.omega"][swings], modes.shapes["Je.tau"][swings]
+    np.testing.assert_allclose(torque, modes.rates[swings] * 0.025 * speed, rtol=ROUNDING)
+    np.testing.assert_allclose(np.array(modes.shapes["line.omega"])[swings, 0], speed, rtol=ROUNDING)

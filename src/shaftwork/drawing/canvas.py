@@ -120,7 +120,8 @@ class Drawing:
 
         stream = io.BytesIO()
         with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": self.name, "pdf.fonttype": 42}):
-            metadata: dict[str, Any] = {"Title": self.name} if ending != "png" else {}
+            title = "".join(sign for sign in self.name if sign.isprintable())
+            metadata: dict[str, Any] = {"Title": title} if ending != "png" else {}
             dates = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(ending, {})
             self.figure().savefig(stream, format=ending, dpi=200, metadata=metadata | dates)
         return stream.getvalue()

@@ -8,8 +8,9 @@ b = D' / C' of its internal damping, and with the places u from -1/2 to 1/2,
     tau(u)   = W (1 + s b) cosh(G u) - V Z (p + d) 2 u sinhc(G u)         sinhc(x) = sinh(x) / x
 
 which are even and odd about the middle. Both are analytic in s but at -1 / b, and neither ever vanishes at the ends, so
-what is singular in a network of shafts is so because of a motion. Everything is divided by exp(G / 2), so that nothing
-overflows.
+what is singular in a network of shafts is so because of a motion. Everything is divided by exp(R / 2), R >= 0 the real
+part of G, so that nothing overflows. G itself would be no scale: it changes its sign where G^2 crosses the negative
+axis, and there the modes of shafts with internal damping lie.
 
 The states x of the network between the shafts, and V and W of each of them, swing as exp(s t) where
 
@@ -68,18 +69,18 @@ class ExactLines:
         return np.asarray(np.sqrt(turns * (turns + 2 * self.friction) / (1 - radius * self.damping)) / np.pi)
 
     def ends(self, s: Complex) -> tuple[Complex, Complex]:
-        """Speeds and torques into the shafts at their ends by (V, W), each (k, q, 2, 2), over exp(G / 2)."""
+        """Speeds and torques into the shafts at their ends by (V, W), each (k, q, 2, 2), over exp(R / 2)."""
         p, stiffer, _, cosh, sinhc = self._halves(s)
         twist, inertia = p * sinhc / self.impedance, self.impedance * (p + self.friction) * sinhc
         return _blocks(cosh, twist), _blocks(inertia, stiffer * cosh)
 
     def end_slopes(self, s: Complex) -> tuple[Complex, Complex]:
-        """The derivatives of `ends` before the division by s, each (k, q, 2, 2), over the same exp(G / 2)."""
+        """The derivatives of `ends` before the division by s, each (k, q, 2, 2), over the same exp(R / 2)."""
         p, stiffer, square, cosh, sinhc = self._halves(s)
         half, damping = self.delay / 2, self.damping
         by_s = (4 * half * (2 * p + self.friction) - square * damping) / stiffer
         small = np.abs(square) < SMALL
-        series = np.exp(-np.sqrt(square) / 2) * (1 / 24 + square / 960 + square**2 / 107520 + square**3 / 23224320)
+        series = np.exp(-np.sqrt(square).real / 2) * (1 / 24 + square / 960 + square**2 / 107520 + square**3 / 23224320)
         slope = np.where(small, series, (cosh - sinhc) / (2 * np.where(small, 1.0, square))) * by_s
         cosh_slope = sinhc / 8 * by_s
         twist = (half * sinhc + p * slope) / self.impedance
@@ -92,7 +93,7 @@ class ExactLines:
         Args:
             number: of the shaft.
             s: (k,) complex frequencies.
-            middle: (2, k) V and W, times exp(G / 2).
+            middle: (2, k) V and W, times exp(R / 2).
             shares: (places,) of the way from its first end.
         """
         p, stiffer, square, _, _ = (values[:, number, None] for values in self._halves(s))
@@ -106,7 +107,7 @@ class ExactLines:
         )
 
     def _halves(self, s: Complex) -> tuple[Complex, Complex, Complex, Complex, Complex]:
-        """p, 1 + s b, G^2, and cosh and sinhc of G / 2 over exp(G / 2), each (k, q)."""
+        """p, 1 + s b, G^2, and cosh and sinhc of G / 2 over exp(R / 2), each (k, q)."""
         p = np.multiply.outer(s, self.delay / 2)
         stiffer = 1 + np.multiply.outer(s, self.damping)
         square = 4 * p * (p + self.friction) / stiffer
@@ -114,8 +115,8 @@ class ExactLines:
 
 
 def _even(exponent: Complex, place: Array) -> tuple[Complex, Complex]:
-    """cosh and sinhc of G u for u from 0 to 1/2, over exp(G / 2)."""
-    grown, double = np.exp(-exponent * (0.5 - place)), 2 * exponent * place
+    """cosh and sinhc of G u for u from 0 to 1/2, over exp(R / 2)."""
+    grown, double = np.exp(exponent * place - exponent.real / 2), 2 * exponent * place
     still = double == 0
     sinhc = np.where(still, 1.0, -np.expm1(-double) / np.where(still, 1.0, double))
     return grown * (1 + np.exp(-double)) / 2, grown * sinhc
@@ -146,7 +147,7 @@ class ExactSlopes:
 
     @property
     def states(self) -> tuple[str, ...]:
-        """Those of the network, then speed and elastic torque of the middle of each shaft, over exp(-G / 2)."""
+        """Those of the network, then speed and elastic torque of the middle of each shaft, over exp(-R / 2)."""
         return (*self.open.states, *(f"{name}.{part}" for name in self.lines.names for part in ("even", "odd")))
 
     @property

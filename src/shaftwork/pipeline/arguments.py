@@ -91,8 +91,15 @@ class Demand:
 
 
 def as_names(names: str | Sequence[str]) -> tuple[str, ...]:
-    """Names of which a single one may be given as a text."""
-    return (names,) if isinstance(names, str) else tuple(names)
+    """Names of which a single one may be given as a text.
+
+    Raises:
+        ParameterError: they are no texts.
+    """
+    listed = (names,) if isinstance(names, str) else tuple(names) if isinstance(names, Iterable) else (names,)
+    if wrong := [name for name in listed if not isinstance(name, str)]:
+        raise ParameterError(f"{wrong[0]!r} is no name. Give the names of parts as texts: ['J1', 'shaft'].")
+    return listed
 
 
 def time_span(t_start: Any, t_end: Any) -> tuple[float, float]:
