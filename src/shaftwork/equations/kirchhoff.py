@@ -234,7 +234,7 @@ class _KirchhoffWriter:
                 yield Row(*self.origin((branch.index,)), partial(self.assembly.coupling, branch.index))
 
     def states(self) -> Iterator[StateEquation]:
-        systems = {"across": lambda: self.solution.speeds, "through": lambda: self.solution.torques}
+        systems = {"across": partial(_speeds, self.solution), "through": partial(_torques, self.solution)}
         for state in self.form.states:
             branch, system = state.branch, systems.get(state.kind)
             make = partial(_row, system, branch) if system else partial(self._integral_row, branch)
@@ -350,3 +350,11 @@ def _listed(names: Iterable[str]) -> str:
     if len(listed) > 6:
         listed = [*listed[:4], f"{len(listed) - 4} others"]
     return " and ".join(filter(None, (", ".join(listed[:-1]), listed[-1]))) if listed else "nothing"
+
+
+def _speeds(solution: SolvedForm) -> EliminationSystem:
+    return solution.speeds
+
+
+def _torques(solution: SolvedForm) -> EliminationSystem:
+    return solution.torques
