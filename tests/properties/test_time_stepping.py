@@ -20,7 +20,7 @@ from tests.reference.hybrid_train import Joint, Train
 from tests.reference.time_stepping import NoSolutionError, Stepper
 
 STEPS = (500, 1000, 2000)
-FINER = (8000, 32000)
+FINER = (8000, 64000)
 """Steps for a train that is still away: its error falls unevenly, as what sticks does so in one step or the next."""
 NEAR = 2e-3
 """Of the largest speed: so far away may the last of the steps be, beside what halving them changes."""
@@ -140,4 +140,7 @@ def test_a_random_hybrid_motion_ends_where_time_stepping_converges(seed: int, ge
     assume(changes[1] < 0.02)  # impacts that multiply each step's error take shorter steps than a test has time for
     reached, bound = end(train), 2.0 * max(changes) + NEAR
     finer = (Stepper(train, count).end() for count in FINER)
-    assert any(np.abs(reached - last).max() / size < bound for last in chain((stepped[-1],), finer))
+    if not any(np.abs(reached - last).max() / size < bound for last in chain((stepped[-1],), finer)):
+        compared = Stepper(train, STEPS[1], compares=True)
+        compared.end()
+        assert not compared.unique  # a gear that locks itself may rest or slide: both are solutions

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -32,6 +32,8 @@ TOUCHES = 1e-12
 """A contact within this twist of its limit, rad, touches: rounding."""
 SLOW = 2.0
 """A contact is hit that closes by more than this many times what torques change in a step."""
+UNLIKE = 1e-6
+"""Speeds that differ by more, as a part of the largest and of 1 rad/s, are two answers."""
 TINY = 1e-11
 """A part of the largest speed or impulse that is rounding."""
 
@@ -46,9 +48,11 @@ class Stepper:
     Args:
         train: what moves.
         steps: how many.
+        compares: whether each step looks for other consistent answers; `unique` then tells that there was none.
     """
 
-    def __init__(self, train: Train, steps: int) -> None:
+    def __init__(self, train: Train, steps: int, *, compares: bool = False) -> None:
+        self.compares, self.unique = compares, True
         self.train, self.steps, self.h = train, steps, train.t_end / steps
         self.n, joints = len(train.inertias), train.joints
         self.gears = [joint for joint in joints if joint.kind == "gear"]
@@ -88,7 +92,10 @@ class Stepper:
         for source in self.train.sources:
             gained[source.a] += h * torque(source, t)
         laws = np.array([self._law(k, t, before) for k in range(len(self.switching))]).reshape(-1, 4)
-        others = [modes for modes in itertools.product(GEAR, repeat=len(self.gears)) if modes != self.modes]
+        ways = list(itertools.product(GEAR, repeat=len(self.gears)))
+        if self.compares and self.unique:
+            self.unique = self._is_one_way(ways, gained, laws, before)
+        others = [modes for modes in ways if modes != self.modes]
         for modes in (self.modes, *sorted(others, key=lambda modes: modes.count("stuck"))):
             solution = self._solved(modes, gained, laws, self.R @ before)
             if solution is not None:
@@ -99,6 +106,16 @@ class Stepper:
         self.twists += h * (self.S @ (before + v)) / 2
         self.gaps += h * (self.R @ (before + v)) / 2
         self.v = v
+
+    def _is_one_way(self, ways: Iterable[tuple[str, ...]], gained: Array, laws: Array, before: Array) -> bool:
+        """Whether all modes of the gears that are consistent lead to the same speeds."""
+        active, speeds = list(self.active), []
+        for modes in ways:
+            self.active = list(active)
+            if (solution := self._solved(modes, gained, laws, self.R @ before)) is not None:
+                speeds.append(solution[0])
+        self.active = active
+        return all(np.abs(v - speeds[0]).max() < UNLIKE * max(1.0, np.abs(before).max()) for v in speeds)
 
     def _law(self, k: int, t: float, before: Array) -> tuple[float, float, float, float]:
         """Bounds of the impulse, speed up to which it has none, and compliance: w = speed + compliance P in between."""
