@@ -169,7 +169,7 @@ def end_torques(run: sw.Solution) -> Array:
 def memory(m: int, *, read: bool = True) -> float:
     """Largest memory in MiB of a process that solves m elements and reads their end torques."""
     code = (
-        f"import sys; sys.path.insert(0, {sys.path[0]!r}); import resource, shaft_models as s; "
+        f"import sys; sys.path.insert(0, {sys.path[0]!r}); import resource, benchmarks.shaft_models as s; "
         f"run = s.long_chain({m}).simulate(s.T_END, t_eval=s.LONG_OUTPUTS, rtol=s.LONG_RTOL, engine='banded'); "
         f"{'s.end_torques(run); ' if read else ''}"
         "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)"
