@@ -24,12 +24,18 @@ USES = {
     "sizing": "sw.sizing.duty",
     "drawing": "net.draw()",
     "studies": "sw.studies.work_precision",
+    "reporting": "sw.report(net, sections=['parts'])",
 }
 """By feature, something small that takes it."""
 
+NEEDS = {"reporting": ("latex", "drawing", "modelfiles")}
+"""By feature, those that it is made of."""
+
 JOINS = {
+    "drawing": ("shaftwork.reporting",),
+    "modelfiles": ("shaftwork.reporting",),
     "hybrid": ("shaftwork.waves.phased_waves", "shaftwork.waves.hybrid_waves", "shaftwork.sweep.phased_ensemble"),
-    "latex": ("shaftwork.lagrange.lagrange_print", "shaftwork.reduce.reduction_print"),
+    "latex": ("shaftwork.lagrange.lagrange_print", "shaftwork.reduce.reduction_print", "shaftwork.reporting"),
 }
 """By feature, modules of other rooms that join these to it; they are loaded where both are at work."""
 
@@ -41,7 +47,7 @@ from pkgutil import walk_packages
 
 import shaftwork as sw
 
-gone, joins, uses, folder = {gone!r}, {joins!r}, {uses!r}, Path({folder!r})
+gone, joins, uses, needs, folder = {gone!r}, {joins!r}, {uses!r}, {needs!r}, Path({folder!r})
 assert Path(sw.__file__).is_relative_to(folder), sw.__file__
 
 for module in walk_packages(sw.__path__, "shaftwork."):
@@ -77,7 +83,8 @@ for feature, use in uses.items():
     try:
         eval(use)
     except ModuleNotFoundError as error:
-        assert feature == gone and error.name.startswith(f"shaftwork.{{gone}}"), (feature, error)
+        needed = (feature, *needs.get(feature, ()))
+        assert gone in needed and error.name.startswith(f"shaftwork.{{gone}}"), (feature, error)
     else:
         assert feature != gone, f"{{use}} works without {{gone}}"
 """
@@ -90,7 +97,7 @@ def run_without(feature: str, folder: Path, uses: dict[str, str]) -> subprocess.
     for item in SOURCE.iterdir():
         if item.name not in (feature, "__pycache__"):
             (package / item.name).symlink_to(item)
-    script = SCRIPT.format(gone=feature, joins=JOINS.get(feature, ()), uses=uses, folder=str(folder))
+    script = SCRIPT.format(gone=feature, joins=JOINS.get(feature, ()), uses=uses, needs=NEEDS, folder=str(folder))
     environment = {**os.environ, "PYTHONPATH": str(folder)}
     return subprocess.run(
         [sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=False, cwd=folder

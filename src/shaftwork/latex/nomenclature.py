@@ -33,39 +33,63 @@ def nomenclature(
 ) -> str:
     """The tables of the variables that equations contain, of the parameters, and of the laws that are given.
 
-    Left out are parameters that have no effect. Laws stand there with all points of their tables, of which formulas
-    show some, and also where the phase has another one.
-
     Args:
         equations: what knows all letters.
         used: names of the variables.
         noted: what some of them are besides, as "state", by name.
         besides: rows before them, of quantities that belong to no part.
     """
-    names, values = equations.symbol_names, equations.values
-    read = effective(equations.form.graph)
-    variables = [
-        (_formula(names[letter.name]), _meaning(letter, noted), _owner(letter), unit(letter.unit))
+    tables = (variables((equations,), used, noted, besides), parameters(equations), laws(equations))
+    return "\n".join(filter(None, tables))
+
+
+def variables(
+    phases: Sequence[Equations], used: Container[str], noted: Mapping[str, str], besides: Sequence[Cells] = ()
+) -> str:
+    """The table of the variables of one or several phases; the other arguments are those of `nomenclature`."""
+    letters = {
+        letter.name: (equations.symbol_names[letter.name], letter)
+        for equations in phases
         for letter in equations.letters
         if not letter.parameter and letter.name in used
-    ]
-    parameters = [
+    }
+    rows = (
+        (_formula(latex), _meaning(letter, noted), _owner(letter), unit(letter.unit))
+        for latex, letter in letters.values()
+    )
+    return table(_columns(48, 40, 38, 21), ("Variable", "Meaning", "Of", "Unit"), (*besides, *rows))
+
+
+def parameters(equations: Equations, origins: Mapping[str, str] | None = None) -> str:
+    """The table of the parameters with their values, without those that have no effect.
+
+    Args:
+        equations: what knows all letters.
+        origins: where values come from, in words, by "part.parameter" or by part; a column of its own where given.
+    """
+    names, values, whence = equations.symbol_names, equations.values, origins or {}
+    read = effective(equations.form.graph)
+    rows = [
         (
             _formula(names[letter.name]),
             in_text(letter.meaning),
             _owner(letter),
             f"${printed_number(values[letter.name])}$",
             unit(letter.unit),
+            *([in_text(whence.get(letter.name, whence.get(letter.owner, "")))] if whence else []),
         )
         for letter in equations.letters
         if letter.parameter and (letter.name in read or letter.name not in equations.form.graph.parameters)
     ]
-    tables = (
-        table(_columns(48, 40, 38, 21), ("Variable", "Meaning", "Of", "Unit"), (*besides, *variables)),
-        table(_columns(34, 38, 30, 21, 20), ("Parameter", "Meaning", "Of", "Value", "Unit"), parameters),
-        table(_columns(34, 24, 68, 20), ("Law", "Of", LAWS, "Unit"), [*_laws(equations)]),
-    )
-    return "\n".join(filter(None, tables))
+    heads = ("Parameter", "Meaning", "Of", "Value", "Unit", *(["From"] if whence else []))
+    return table(_columns(*((28, 30, 22, 19, 17, 22) if whence else (34, 38, 30, 21, 20))), heads, rows)
+
+
+def laws(equations: Equations) -> str:
+    """The table of the laws that are given: with all points of their tables, of which formulas show some, and also
+    where the phase has another one.
+    """
+    return table(_columns(34, 24, 68, 20), ("Law", "Of", LAWS, "Unit"), [*_laws(equations)])
 
 
 def _laws(equations: Equations) -> Iterator[Cells]:

@@ -317,7 +317,7 @@ def damage_of(reader: Reader, name: str, sn: object, smallest: float) -> Damage:
 
 def damages(reader: Reader, sn: SNLine | Mapping[str, SNLine], smallest: float) -> dict[str, Damage]:
     """The damage of every shaft and spring, or of the quantities that S-N lines are given for."""
-    lines = dict(sn) if isinstance(sn, Mapping) else dict.fromkeys(_twisted(reader), sn)
+    lines = dict(sn) if isinstance(sn, Mapping) else dict.fromkeys(twisted(reader), sn)
     if not lines:
         raise SignalError(
             f"There is no shaft or spring in '{reader.title}'. Name a quantity: damage('part.tau', sn=...)."
@@ -325,7 +325,7 @@ def damages(reader: Reader, sn: SNLine | Mapping[str, SNLine], smallest: float) 
     return {name: damage_of(reader, name, line, smallest) for name, line in lines.items()}
 
 
-def _twisted(reader: Reader) -> tuple[str, ...]:
+def twisted(reader: Reader) -> tuple[str, ...]:
     """The torques of all that is twisted: springs and gaps have a twist, long shafts a torque along them."""
     units = reader.observer.units
     parts = dict.fromkeys(name.rpartition(".")[0] for name in units)

@@ -71,8 +71,8 @@ def plot_signals(
         SignalError: there is no such quantity.
     """
     units = {name: reader.unit(name) for name in names}
-    curves = {name: _curve(reader, name) for name in units}
-    groups = _groups(curves, units)
+    curves = {name: curve(reader, name) for name in units}
+    groups = grouped(curves, units)
     parts = tuple(phases[0].modes) if len(phases) > 1 else ()
     heights = [HEIGHT] * len(groups) + ([STRIP * (len(parts) + 1)] if parts else [])
     figure = new_figure("Solution.plot()", 9.0, 1.2 + sum(heights), reader.title)
@@ -90,7 +90,8 @@ def plot_signals(
     return figure
 
 
-def _curve(reader: Reader, name: str) -> Curve:
+def curve(reader: Reader, name: str) -> Curve:
+    """A quantity of a motion at even times and where it turns, as many as can be seen."""
     even = np.linspace(reader.steps[0], reader.steps[-1], POINTS)
     if reader.places(name):
         return even, reader.values(name, even, reader.dense(even))
@@ -113,7 +114,7 @@ def _envelope(times: Array, values: Array) -> Curve:
     return times[places], values[places]
 
 
-def _groups(curves: Mapping[str, Curve], units: Mapping[str, str]) -> list[tuple[str, list[str]]]:
+def grouped(curves: Mapping[str, Curve], units: Mapping[str, str]) -> list[tuple[str, list[str]]]:
     """Names by axis, with their unit: those of one unit whose largest values are alike, in the order of the first."""
     sizes = {name: float(np.abs(values).max()) for name, (_, values) in curves.items()}
     groups: list[tuple[str, list[str]]] = []

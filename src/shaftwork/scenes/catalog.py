@@ -11,6 +11,13 @@ from shaftwork.core.errors import ParameterError
 from shaftwork.pipeline.network import Network
 
 T = TypeVar("T")
+LITERATURE = {
+    "Marinkovic 2012": "Z. Marinković, D. Marinković, G. Petrović, P. Milić: Modelling and simulation of dynamic "
+    "behaviour of electric motor driven mechanisms. Technical Gazette 19(4), 2012, 717-725",
+    "Popenda 2019": "A. Popenda: Mathematical modelling of transmission shafts based on electrical and mechanical "
+    "similarities. Przegląd Elektrotechniczny, 2019",
+}
+"""The papers of the scenes by the names under which they are cited."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,149 @@
+"""Sections on the motion: how it starts, its curves, phases, extremes, energies and load cycles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shaftwork.core.errors import MissingExtraError, ShaftworkError
+from shaftwork.core.screen import counted
+from shaftwork.equations.spelling import in_text
+from shaftwork.latex.nomenclature import breakable, unit
+from shaftwork.reporting.latex_parts import columns, listed, number, paragraphs, picture
+from shaftwork.results.fatigue import twisted
+
+if TYPE_CHECKING:
+    from shaftwork.reporting.subject import Subject
+    from shaftwork.results.solution import Solution
+
+CURVES = 4
+"""Quantities in a picture, which is then no higher than a page."""
+ROWS = 20
+"""Phases listed of the beginning, and as many of the end, of a motion that has more."""
+MOST_CYCLES = 6
+"""Quantities whose load cycles are counted."""
+
+
+def conditions(subject: Subject) -> str:
+    """Where the motion starts and how long it lasts."""
+    solution = subject.solution
+    if solution is None:
+        return ""
+    start, end = solution.steps[0], solution.steps[-1]
+    named = ((name, value) for name, value in solution.initial.items() if isinstance(value, float) and value)
+    rows = [(breakable(name), number(value), unit(solution.observer.units.get(name, ""))) for name, value in named]
+    begins = "The motion starts with the values below." if rows else "The motion starts at rest."
+    lasts = f"It is computed from {start:g} s to {end:g} s."
+    return paragraphs(in_text(f"{begins} {lasts}"), columns(("Quantity", "Start value", "Unit"), rows, (3, 2, 2)))
+
+
+def motion(subject: Subject) -> str:
+    """Curves of the signals, and the phases of the motion."""
+    solution = subject.solution
+    if solution is None or not subject.signals:
+        return ""
+    pictures = []
+    count = -(-len(subject.signals) // CURVES)
+    for place in range(count):
+        names = tuple(
+            subject.signals[k] for k in range(len(subject.signals)) if k * count // len(subject.signals) == place
+        )
+        label = f"motion-{place + 1}"
+        subject.figures[label], subject.curves[label] = solution.plot(*names), names
+        pictures.append(picture(label, f"{', '.join(names)} over time"))
+    return paragraphs(*pictures, _phases(solution))
+
+
+def _phases(solution: Solution) -> str:
+    rows = solution.phases
+    if not rows:
+        return ""
+    shown = rows if len(rows) <= 2 * ROWS else (*rows[:ROWS], *rows[-ROWS:])
+    cells = [(number(row.start), number(row.end), in_text(row.name)) for row in shown]
+    if len(rows) > 2 * ROWS:
+        cells.insert(ROWS, (r"\ldots", r"\ldots", in_text(f"{len(rows) - 2 * ROWS} more")))
+    events = f"The motion has {counted(len(rows), 'phase')} and {counted(len(solution.events), 'event')}."
+    return paragraphs(in_text(events), columns(("From s", "To s", "Phase"), cells, (1, 1, 6)))
+
+
+def extremes(subject: Subject) -> str:
+    """The true extremes of the signals and of all that is twisted, found between the output times too."""
+    solution = subject.solution
+    if solution is None:
+        return ""
+    names = dict.fromkeys((*subject.signals, *twisted(solution.reader)))
+    rows = []
+    for name in names:
+        least, most, mean, end = solution.extremes.row(name)
+        values = (number(least), number(least.t, 4), number(most), number(most.t, 4), number(mean), number(end))
+        rows.append((f"{breakable(name)} in {unit(least.unit)}", *values))
+    said = "Extremes are those of the motion itself, searched between the output times, on both sides of every jump."
+    heads = ("Quantity", "Minimum", "at s", "Maximum", "at s", "Mean", "End")
+    return paragraphs(in_text(said), columns(heads, rows, (4.6, 4.25, 2.9, 4.25, 2.9, 4.25, 4.25)))
+
+
+def energy(subject: Subject) -> str:
+    """Who supplies and who loses energy, how much is left over, and how accurately was integrated."""
+    solution = subject.solution
+    if solution is None:
+        return ""
+    balance = solution.energy
+    rows = [("supplied by", breakable(part), number(value)) for part, value in balance.supplied_by.items() if value]
+    rows += [("lost in", breakable(part), number(value)) for part, value in balance.lost_in.items() if value]
+    rows.append(("stored", "more than at the start", number(balance.stored[-1] - balance.stored[0])))
+    said = (
+        f"The engine {solution.engine} took {solution.statistics.get('steps', 0)} steps at the relative tolerance "
+        f"{solution.rtol:g}. What is supplied less what is lost and stored is {balance.residual:.1e} of the work done "
+        "at most; it measures the error of the integration without a reference."
+    )
+    return paragraphs(columns(("Energy", "Part", "J"), rows, (2, 4, 2)), in_text(said))
+
+
+def cycles(subject: Subject) -> str:
+    """Load cycles of what is twisted, and the damage by its S-N line."""
+    solution = subject.solution
+    names = twisted(solution.reader)[:MOST_CYCLES] if solution else ()
+    if solution is None or not names:
+        return ""
+    try:
+        counts = {name: solution.rainflow(name, place=_worst_place(solution, name)) for name in names}
+    except MissingExtraError as missing:
+        subject.notes.append(f"Load cycles are not counted: {missing}")
+        return ""
+    rows = [
+        (breakable(name), number(count.range.max(initial=0.0)), number(count.count.sum()), unit(count.unit))
+        for name, count in counts.items()
+    ]
+    said = (
+        "Cycles are counted by rainflow after ASTM E1049; one that stays open counts half. Along a shaft those of the "
+        "place with the largest torque stand here."
+    )
+    table = columns(("Quantity", "Largest range", "Cycles", "Unit"), rows, (4, 2, 2, 2))
+    return paragraphs(in_text(said), table, _damage(subject, solution))
+
+
+def _worst_place(solution: Solution, name: str) -> int | None:
+    """Of a quantity along a part the place of its largest value."""
+    row = solution.extremes.row(name)
+    place = max(row.least, row.most, key=abs).place
+    return None if place is None else int(np.argmin(np.abs(solution.places[name] - place)))
+
+
+def _damage(subject: Subject, solution: Solution) -> str:
+    if subject.sn is None:
+        return ""
+    try:
+        damages = solution.damage(sn=subject.sn)
+    except ShaftworkError as reason:
+        subject.notes.append(f"No damage: {reason}")
+        return ""
+    rows = [
+        (breakable(name), number(worn.damage), number(worn.repetitions), number(worn.hours))
+        for name, worn in damages.items()
+    ]
+    lines = subject.sn if isinstance(subject.sn, Mapping) else {"all": subject.sn}
+    said = [f"S-N line of {name}: {line!r}" for name, line in lines.items()]
+    heads = ("Quantity", "Damage", "Motions to failure", "Hours to failure")
+    return paragraphs(columns(heads, rows, (4, 2, 3, 3)), listed(said))
