@@ -24,6 +24,7 @@ USES = {
     "sizing": "sw.sizing.duty",
     "drawing": "net.draw()",
     "studies": "sw.studies.work_precision",
+    "spectra": "net.simulate(0.1).spectrum('shaft.tau')",
     "reporting": "sw.report(net, sections=['parts'])",
 }
 """By feature, something small that takes it."""

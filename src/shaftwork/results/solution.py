@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
+    from shaftwork.spectra.order_spectra import OrderSpectra
+    from shaftwork.spectra.spectrum import Spectrum
+
 COMPILED = ("dense", "observer")
 """What of a motion holds compiled code."""
 ALIKE = 1e-6
@@ -281,6 +284,62 @@ class Solution:
             SignalError: there is no such quantity or place.
         """
         return load_cycles(self.reader, name, place, smallest)
+
+    def spectrum(
+        self,
+        name: str,
+        *,
+        place: int | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        f_max: float | None = None,
+    ) -> Spectrum:
+        """The amplitude spectrum of a quantity, such as "shaft.tau", over the run or a span of it.
+
+        Args:
+            name: of the quantity.
+            place: index in `places` of a quantity that is read along a part; by default the middle one.
+            start: of the span, s.
+            end: of the span, s.
+            f_max: highest frequency, Hz; by default sampling is refined until there is little above it.
+
+        Raises:
+            ParameterError: the span is not within the motion, or there is no such place.
+            SignalError: there is no such quantity.
+        """
+        from shaftwork.spectra.spectrum import spectrum
+
+        return spectrum(self.reader, name, place, start, end, f_max)
+
+    def order_spectra(
+        self,
+        name: str,
+        speed: str,
+        *,
+        place: int | None = None,
+        turns: float = 8.0,
+        order_max: float = 20.0,
+        start: float | None = None,
+        end: float | None = None,
+    ) -> OrderSpectra:
+        """Spectra of a quantity over the order of a shaft, while its speed changes: a waterfall.
+
+        Args:
+            name: of the quantity, such as "shaft.tau".
+            speed: of the shaft, such as "motor.omega", which must turn one way.
+            place: index in `places` of a quantity that is read along a part; by default the middle one.
+            turns: of the shaft in each spectrum; its lines are 1 / turns of an order apart.
+            order_max: highest order.
+            start: of the span, s.
+            end: of the span, s.
+
+        Raises:
+            ParameterError: the shaft does not turn one way, or not often enough; an argument is out of its range.
+            SignalError: there is no such quantity.
+        """
+        from shaftwork.spectra.order_spectra import order_spectra
+
+        return order_spectra(self.reader, name, speed, place, turns, order_max, (start, end))
 
     @overload
     def damage(self, name: str, *, sn: SNLine, smallest: float = SMALLEST) -> Damage: ...
