@@ -25,9 +25,6 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.formulation.explicit_rows import Rows
 
-SHORTEST = 4
-"""Fewer equal rows are written one by one."""
-
 
 @dataclass(frozen=True)
 class Stencil:
@@ -61,7 +58,8 @@ def runs_of(rows: Rows) -> tuple[Stencil, ...]:
             runs.append(Stencil(i, 1, relative))
     written: list[Stencil] = []
     for run in runs:
-        written += [run] if run.count >= SHORTEST else [Stencil(run.first + k, 1, run.rate) for k in range(run.count)]
+        # Fewer than four equal rows are written one by one.
+        written += [run] if run.count >= 4 else [Stencil(run.first + k, 1, run.rate) for k in range(run.count)]
     return tuple(written)
 
 

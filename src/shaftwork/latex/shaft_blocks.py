@@ -27,8 +27,6 @@ from shaftwork.network.kinds import Kind
 if TYPE_CHECKING:
     from shaftwork.equations.fields import Field
 
-LARGEST_WRITTEN_OUT = 6
-"""Degree up to which the weights are printed as numbers."""
 LAST_INDEX = re.compile(f"{INDEX_OPENS}[0-9]+{INDEX_CLOSES}(?!.*{INDEX_OPENS})")
 MEANING = r"""Here $\ell_{j}$ are the Lagrange polynomials of the $n + 1$ nodes of Gauss and Lobatto in $[0, 1]$ and
 $h_{j}$ the weights of their quadrature, $y_{k}$ and $\lambda_{k}$ the $n$ nodes and weights of Gauss; $n$ is the degree
@@ -188,10 +186,9 @@ class Sums:
 def sums_of(quantities: Quantities, writer: Writer) -> tuple[Sums, ...]:
     """The general rows of every shaft that has them."""
     shafts = [(part, part.component.resolved) for part in quantities.graph.parts if isinstance(part.component, Shaft)]
+    # up to degree 6 the weights are printed as numbers
     return tuple(
-        Sums(part, model.n, quantities, writer)
-        for part, model in shafts
-        if isinstance(model, Spectral) and model.n > LARGEST_WRITTEN_OUT
+        Sums(part, model.n, quantities, writer) for part, model in shafts if isinstance(model, Spectral) and model.n > 6
     )
 
 
