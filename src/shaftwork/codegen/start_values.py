@@ -154,9 +154,9 @@ class Start:
             self._fixed[list(shaft.states)] = True
         self._meet([pair for pair in pairs if not pair[0].is_across], is_across=False)
         for name, shaft in shafts.items():
-            along = shaft.along(self._bound, self._t, self._x)
+            torques = shaft.torques(self._bound, self._t, self._x)
             size = max(abs(values[name]), np.abs(self._x[list(shaft.states)]).max())
-            self._refuse_other(name, float(along[np.abs(along - values[name]).argmax()]), size)
+            self._refuse_other(name, float(torques[np.abs(torques - values[name]).argmax()]), size)
 
     def _linear(self, name: str) -> LinearQuantity:
         quantity = self._names.quantity(name)
@@ -188,7 +188,7 @@ class Start:
             ParameterError: the quantity is none to start from.
         """
         name, form = quantity.name, self._bound.program.form
-        if not quantity.is_across and self._names.along(name) is not None:
+        if not quantity.is_across and self._names.torque_along(name) is not None:
             raise self._refused(name, "is that of one end of a shaft of several elements")
         if row.moved:
             raise self._refused(name, "follows from laws or accelerations")
@@ -218,12 +218,12 @@ class Start:
             scaled = rows / np.abs(rows).max(axis=1, keepdims=True).clip(np.finfo(float).tiny)
             free = np.asarray(linalg.null_space(scaled, rcond=TYPED))
             changes = np.asarray(np.linalg.lstsq(rows, gaps, rcond=None)[0])
-        along = stores.slopes @ free
-        moves = np.abs(along).max(axis=1, initial=0.0) > TYPED * np.abs(stores.slopes).max(axis=1, initial=0.0)
+        free_slopes = stores.slopes @ free
+        moves = np.abs(free_slopes).max(axis=1, initial=0.0) > TYPED * np.abs(stores.slopes).max(axis=1, initial=0.0)
         rests = stores.is_free | moves
         if free.size:
             moved = stores.slopes[rests] @ changes + stores.offsets[rests]
-            changes = changes - free @ np.linalg.lstsq(along[rests], moved, rcond=None)[0]
+            changes = changes - free @ np.linalg.lstsq(free_slopes[rests], moved, rcond=None)[0]
         size = np.abs(np.append(changes, stores.offsets)).max(initial=0.0)
         left = rests & (np.abs(stores.slopes @ changes + stores.offsets) > TYPED * size)
         if left.any():

@@ -82,7 +82,7 @@ class Equations:
         eliminated: dependent stores, speeds without a store, reactions of couplings and prescribed speeds.
         notes: what was left out or decided by numerical values, in words.
         phase: the mode of every part that changes its mode, "gap open, load stuck", for which the rows hold.
-        source: whose letters are printed.
+        notation: whose letters are printed.
         in_phase: from a phase to the equations there, where parts change their mode.
     """
 
@@ -96,12 +96,12 @@ class Equations:
     eliminated: tuple[Eliminated, ...]
     notes: tuple[str, ...]
     phase: str = field(default="", kw_only=True)
-    source: Notation = field(default=OWN, kw_only=True)
+    notation: Notation = field(default=OWN, kw_only=True)
     in_phase: Callable[[str | NamedPhase], Equations] | None = None
 
     @cached_property
     def _letters(self) -> tuple[Mapping[str, str], tuple[Letter, ...]]:
-        return letters_of(self.form, self.assembly.quantities, self.source)
+        return letters_of(self.form, self.assembly.quantities, self.notation)
 
     @cached_property
     def inverses(self) -> Mapping[Symbol, Symbol]:
@@ -269,7 +269,7 @@ class Equations:
         Raises:
             ParameterError: there is no such notation.
         """
-        return self if notation is None else replace(self, source=notation_of(notation))
+        return self if notation is None else replace(self, notation=notation_of(notation))
 
     def latex(
         self,

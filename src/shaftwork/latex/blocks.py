@@ -202,7 +202,7 @@ class Blocks:
         graph = self.equations.form.graph
         parameters = {letter.name for letter in self.equations.letters if letter.parameter}
         order = sorted(names, key=lambda name: name not in parameters)
-        ordered = with_rates({name: names[name] for name in order}, self.equations.source.rate_of)
+        ordered = with_rates({name: names[name] for name in order}, self.equations.notation.rate_of)
         values = self.equations.values if self.values else {}
         printed = {**ordered, **_dotted(self.equations)}
         angles = map(self.equations.assembly.quantities.angle, range(len(graph.nodes)))

@@ -225,7 +225,7 @@ def _field_letters(field: Field) -> tuple[Letter, ...]:
     parameters = parameter_letters(name, (*component.declared.values(), *field.derived, waves))
     quantities = (("tau", ROTATION.through, ""), ("tau_c", ROTATION.through, "c"), ("omega", ROTATION.across, ""))
     variables = (Letter(f"{name}.{label}", q.latex, mark, q.unit, "") for label, q, mark in quantities)
-    return tuple(map(field.equations.source.written, (*parameters, *variables)))
+    return tuple(map(field.equations.notation.written, (*parameters, *variables)))
 
 
 def _field_names(field: Field) -> dict[str, str]:
@@ -238,7 +238,7 @@ def _field_names(field: Field) -> dict[str, str]:
 def _field_writer(field: Field, atoms: Mapping[Expr, Symbol], *, values: bool) -> Writer:
     """Prints parameters, quantities of the network, and functions of x and t by the symbols that stand for them."""
     equations, letters = field.equations, _field_letters(field)
-    rates = with_rates(equations.symbol_names, equations.source.rate_of)
+    rates = with_rates(equations.symbol_names, equations.notation.rate_of)
     along = {name: latex for shaft in equations.fields for name, latex in _field_names(shaft).items()}
     functions = {symbol.name: _printed(atom, along) for atom, symbol in atoms.items()}
     names = {**along, **functions, **{name: latex for name, latex in rates.items() if name not in along}}

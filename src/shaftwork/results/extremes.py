@@ -10,13 +10,14 @@ import numpy as np
 
 from shaftwork.core.errors import AccuracyWarning
 from shaftwork.core.notices import warn
+from shaftwork.numerics.tolerances import GOLDEN
 from shaftwork.results.course import course
 from shaftwork.results.observer import Array, Reader
 
 HIDDEN, STRAYED = 0.05, 0.2
 """Of the largest value: what samples may miss of an extreme, and the root mean square by which lines between samples
 may miss the quantity. Seven samples in a swing miss a twentieth of it."""
-SHARES = np.arange(1, 9) * (np.sqrt(5) - 1) / 2 % 1
+SHARES = np.arange(1, 9) * GOLDEN % 1
 """Where between its neighbours a time lies: in step with nothing that swings, and few, for engines that take as many
 matrix exponentials as there are distances from a step end."""
 MOST_OUTPUTS = 10_000_000
