@@ -17,7 +17,7 @@ from sympy import Symbol, count_ops, cse
 from shaftwork.codegen.array_form.arrays import ArrayProgram, BoundArrays
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.code import branchwise, scalar
-from shaftwork.codegen.runs import MachineCode, RunProgram
+from shaftwork.codegen.looped_source import LoopedSource, MachineCode
 from shaftwork.components.discontinuities import pieces_degree
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.calls import BoundedCache
@@ -251,14 +251,14 @@ class CompiledModel:
         return self.scalar.source
 
     @cached_property
-    def _loops(self) -> RunProgram:
+    def _loops(self) -> LoopedSource:
         title = self.form.graph.name
         if self.form.waves:
             raise CompileError(
                 f"'{title}' has travelling waves, whose equations need the past. Take model=Spectral(16)."
             )
         try:
-            return RunProgram(explicit_rows(self.form), title)
+            return LoopedSource(explicit_rows(self.form), title)
         except BlockTooLargeError:
             raise CompileError(
                 f"'{title}' has no right-hand side line by line: too many rates are coupled for symbols. "

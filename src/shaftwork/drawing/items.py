@@ -14,8 +14,6 @@ End = int
 """The number of a node; `GROUND` is the frame or the reference."""
 MOST_LETTERS, MOST_VALUES = 2, 4
 """Parameters of a part whose letters stand beside it, and whose values do; one of more has its name alone."""
-MOST_ELEMENTS = 4
-"""Elements of a part beyond which its circuit is one box: a shaft of many elements, a machine with windings."""
 
 SHAPES: Mapping[str, str] = {
     "Inertia": "disc",
@@ -212,7 +210,8 @@ def circuit_items(letters: Letters) -> Iterator[Item]:
         branches = [graph.branches[k] for k in part.branches]
         inner = any(node not in (*ports, GROUND) for branch in branches for node in nodes_of(branch))
         symbol = symbol_of(part)
-        whole = "line" if symbol == "shaft" else "box" if len(branches) > MOST_ELEMENTS or inner else ""
+        # A part of more than four elements, such as a machine with windings, is one box.
+        whole = "line" if symbol == "shaft" else "box" if len(branches) > 4 or inner else ""
         whole = whole or ("diode" if symbol in ("diode", "freewheel") else "" if branches else "break")
         if whole:
             ends = (*ports, GROUND)[: max(2, len(ports))]

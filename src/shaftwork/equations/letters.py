@@ -66,13 +66,13 @@ class Named:
 
 
 def letters_of(
-    form: StateForm, quantities: Quantities, source: Notation
+    form: StateForm, quantities: Quantities, notation: Notation
 ) -> tuple[Mapping[str, str], tuple[Letter, ...]]:
-    """LaTeX of every symbol by name, and the letters of a source in the order of the parts, for the nomenclature.
+    """LaTeX of every symbol by name, and the letters of a notation in the order of the parts, for the nomenclature.
 
     Parts of one class whose names differ by a number are printed in one style, so that they stay a series.
     """
-    bearers = (*_parts(form, quantities, source), *_nodes(quantities, source))
+    bearers = (*_parts(form, quantities, notation), *_nodes(quantities, notation))
     series: dict[tuple[str, str], list[Named]] = {}
     for family, bearer in bearers:
         series.setdefault((family, split_index(bearer.name)[0]), []).append(bearer)
@@ -92,7 +92,7 @@ def letters_of(
     return printed, tuple(letters)
 
 
-def _parts(form: StateForm, quantities: Quantities, source: Notation) -> Iterator[tuple[str, Named]]:
+def _parts(form: StateForm, quantities: Quantities, notation: Notation) -> Iterator[tuple[str, Named]]:
     graph = form.graph
     variables: dict[int, list[Letter]] = {number: [] for number in range(len(graph.parts))}
     for number, letter in _quantity_letters(form, quantities):
@@ -100,7 +100,7 @@ def _parts(form: StateForm, quantities: Quantities, source: Notation) -> Iterato
     for number, part in enumerate(graph.parts):
         declarations = [part.component.declared[name] for name in part.parameters]
         parameters = parameter_letters(part.name, (*declarations, *part.derived))
-        letters = _distinct(map(source.written, (*parameters, *variables[number])))
+        letters = _distinct(map(notation.written, (*parameters, *variables[number])))
         shortable = (*part.component.declared, *(letter.base for letter in letters))
         yield type(part.component).__name__, Named(part.name, letters, part.component.symbol, shortable)
 
@@ -225,7 +225,7 @@ def _distinct(letters: Iterable[Letter]) -> tuple[Letter, ...]:
     return tuple(sorted(by_latex.values(), key=lambda letter: order[letter.name]))
 
 
-def _nodes(quantities: Quantities, source: Notation) -> Iterator[tuple[str, Named]]:
+def _nodes(quantities: Quantities, notation: Notation) -> Iterator[tuple[str, Named]]:
     """Nodes whose speed is named after no part."""
     for number, name in enumerate(quantities.graph.nodes):
         if number not in quantities.owners and number not in quantities.inner:
@@ -234,7 +234,7 @@ def _nodes(quantities: Quantities, source: Notation) -> Iterator[tuple[str, Name
                 _letter(quantities.node(number), domain.across),
                 _letter(quantities.angle(number), domain.integral),
             )
-            yield f"node of {domain.name}", Named(name, tuple(map(source.written, letters)), None, ())
+            yield f"node of {domain.name}", Named(name, tuple(map(notation.written, letters)), None, ())
 
 
 def with_derived(values: Mapping[str, float], definitions: Mapping[Symbol, Expr]) -> dict[str, float]:

@@ -161,16 +161,16 @@ NOTATIONS: Mapping[str, Notation] = {
 """The notations that equations are printed in by name."""
 
 
-def notation_of(source: str | Notation) -> Notation:
+def notation_of(name: str | Notation) -> Notation:
     """A notation by its name.
 
     Raises:
         ParameterError: there is no such one.
     """
-    if isinstance(source, Notation):
-        return source
-    if not isinstance(source, str) or source not in NOTATIONS:
+    if isinstance(name, Notation):
+        return name
+    if not isinstance(name, str) or name not in NOTATIONS:
         raise ParameterError(
-            f"There is no notation {source!r}. There are: {', '.join(map(repr, NOTATIONS))}; or give a Notation."
+            f"There is no notation {name!r}. There are: {', '.join(map(repr, NOTATIONS))}; or give a Notation."
         )
-    return NOTATIONS[source]
+    return NOTATIONS[name]

@@ -40,8 +40,6 @@ from shaftwork.results.solution import Solution
 
 SmallMotions = Callable[[Point, Time, Names], LinearModel | ExactModel]
 """From a point, a time and names of inputs to the network near that point."""
-NAMED = 4
-"""Values of a point that a title names."""
 
 
 def speeds_to_give(model: CompiledModel) -> Mapping[str, float | None]:
@@ -198,7 +196,8 @@ def about(model: CompiledModel, at: Point, t: float) -> str:
     if isinstance(at, Solution):
         return f"at t = {at.t[0]:g} s of a motion" + ("" if t == at.t[0] else when)
     entries = [f"{name} = {briefly(value)}" for name, value in (at or {}).items()]
-    shown = ", ".join(entries if len(entries) <= NAMED else [*entries[: NAMED - 1], "..."])
+    most = 4  # values that a title names
+    shown = ", ".join(entries if len(entries) <= most else [*entries[: most - 1], "..."])
     return (f"at {shown}" if entries else "at rest") + when
 
 

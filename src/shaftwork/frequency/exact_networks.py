@@ -44,8 +44,6 @@ if TYPE_CHECKING:
 Compile = Callable[[Netlist], Model]
 OWN = Spectral(16)
 """The mesh in place of a wave where quantities are named and operating points are read."""
-PER_HALF_WAVE, BESIDES, REFINED = 2.0, 8, 1.4
-"""Degree of a mesh that starts a search to some nine digits: for each half wave, besides, and finer at each attempt."""
 MESHES = 4
 """Meshes that are kept for later points."""
 
@@ -196,7 +194,8 @@ class ExactNetwork:
 
     def _meshed(self, radius: float, attempt: int) -> Model:
         waves = self.lines.half_waves(radius)
-        degrees = tuple(int(n) for n in np.ceil((PER_HALF_WAVE * waves + BESIDES) * REFINED**attempt))
+        # Two for each half wave and eight besides start a search to some nine digits; each attempt is finer.
+        degrees = tuple(int(n) for n in np.ceil((2.0 * waves + 8) * 1.4**attempt))
         if max(degrees) > MOST_SPECTRAL:
             shaft = self.lines.names[int(waves.argmax())]
             raise ParameterError(

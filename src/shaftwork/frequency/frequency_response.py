@@ -21,13 +21,6 @@ from shaftwork.results.plotting import new_figure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-DENSE = 48
-"""States up to which many frequencies are solved at once by dense elimination; beyond, one by one and sparse."""
-ROUNDINGS = 64
-"""A natural frequency is hit when it is nearer than so many rounding errors."""
-ASIDE, FARTHEST = 1e-6, 0.1
-"""Where one is hit, the response is read so far to both sides, or farther in a stiff network, by these fractions."""
-
 
 @dataclass(frozen=True, eq=False)
 class FrequencyResponse:
@@ -184,14 +177,16 @@ class _Response:
 
     def _nearness(self, s: Complex) -> Array:
         """The distance from s within which an eigenvalue is hit, 1/s."""
-        return np.asarray(np.finfo(float).eps * np.maximum(ROUNDINGS * np.abs(s), self._system.size))
+        # 64 rounding errors of s, or those of the matrix
+        return np.asarray(np.finfo(float).eps * np.maximum(64 * np.abs(s), self._system.size))
 
     def _limit(self, s: complex) -> complex:
         """The response at a natural frequency: infinite, or finite where input or output does not take part in it.
 
         A pole turns its sign there, so the difference of both sides grows towards it, and without one it vanishes.
         """
-        aside = min(max(ASIDE, 1e3 * float(self._nearness(np.array([s]))[0]) / abs(s)), FARTHEST)
+        # so far to both sides, by a fraction of s; farther in a stiff network
+        aside = min(max(1e-6, 1e3 * float(self._nearness(np.array([s]))[0]) / abs(s)), 0.1)
         far_below, below, above, far_above = self._read(s * (1 + aside * np.array([-2.0, -1.0, 1.0, 2.0])))[0]
         if abs(above - below) > abs(far_above - far_below):
             return complex(np.inf, 0.0)
@@ -214,7 +209,8 @@ class StateEquations:
     def solved(self, s: Complex, right: Complex) -> Complex:
         """Solutions (k, n, 2) of right-hand sides (k, n, 2), NaN where the matrix is singular."""
         size = self._matrix.shape[0]
-        if size <= DENSE:
+        # Dense elimination solves all frequencies at once; of more states one by one, and sparse, is faster.
+        if size <= 48:
             return solved_densely(s[:, None, None] * np.eye(size) - self._matrix.toarray(), right)
         identity = sparse.eye_array(size, format="csc")
         solved = np.empty_like(right, dtype=complex)

@@ -31,11 +31,6 @@ from shaftwork.network.graph import GROUND, GraphPart
 from shaftwork.network.kinds import Kind
 from shaftwork.results.observer import Complex
 
-NEARBY = 1e-9
-"""A law is looked at so far to both sides of the point, as a fraction of it, to see whether it jumps there."""
-JUMP = 1e-3
-"""A law jumps where its two values differ by more than this fraction of them, its slope taken into account."""
-
 
 def refuse_waves(form: StateForm) -> None:
     """Refuse a network of whose lines nothing is told.
@@ -231,12 +226,14 @@ def _refuse_jumps(bound: BoundArrays, t: float, y: Array, x: Array) -> None:
     switching = np.array([jumps(template.law, ACROSS, INTEGRAL, *template.reads) for template in templates], dtype=bool)
     if not switching.any():
         return
-    step_y, step_x = (NEARBY * np.maximum(np.abs(values), 1.0) for values in (y, x))
+    # A law is read so near to the point, on both sides of it. It jumps where its two values differ by more than a
+    # thousandth of them, its slope taken into account.
+    step_y, step_x = (1e-9 * np.maximum(np.abs(values), 1.0) for values in (y, x))
     above, below = (inputs.values(t, y + side * step_y, x + side * step_x, p) for side in (1.0, -1.0))
     by_y, by_x = inputs.slopes(t, y, x, p)
     expected = 2 * (by_y @ step_y + by_x @ step_x[: inputs.states])
     gap = np.abs(above - below - expected)
-    if (bad := np.flatnonzero(switching & (gap > JUMP * np.maximum(np.abs(above), np.abs(below))))).size:
+    if (bad := np.flatnonzero(switching & (gap > 1e-3 * np.maximum(np.abs(above), np.abs(below))))).size:
         raise SimulationError(f"{_laws_of(bound, bad)} a jump at this point and so no slope. {_elsewhere(t)}")
 
 

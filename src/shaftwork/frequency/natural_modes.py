@@ -28,8 +28,6 @@ EQUAL = 1e-6
 first is the reference of the shape."""
 MOVES = 1e-9
 """A node moves when its amplitude, or speed, is more than this fraction of the largest."""
-SHOWN, LABELS = 6, 20
-"""Modes in a picture when nobody says which, and the most nodes that are named under it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,8 +104,9 @@ class Modes:
         """
         if wrong := [number for number in numbers if number not in range(len(self))]:
             raise ParameterError(f"There is no mode {wrong[0]}: '{self.title}' has {len(self)}, counted from 0.")
-        swinging = np.flatnonzero(self.rates.imag > 0)[:SHOWN].tolist()
-        return _plot(self, numbers or tuple(swinging) or tuple(range(min(SHOWN, len(self)))))
+        most = 6  # modes where nobody says which
+        swinging = np.flatnonzero(self.rates.imag > 0)[:most].tolist()
+        return _plot(self, numbers or tuple(swinging) or tuple(range(min(most, len(self)))))
 
 
 class _Shapes(Mapping[str, Complex]):
@@ -287,7 +286,7 @@ def _plot(modes: Modes, numbers: tuple[int, ...]) -> Figure:
         fullest[0].axes.legend(loc="best", frameon=False, fontsize=8)
     named = [(place, name.rpartition(".")[0]) for name, (_, place) in nodes.items()]
     named = [(place, name) for place, name in named if "." not in name]  # those inside a part speak for themselves
-    shown = named[:: max(1, -(-len(named) // LABELS))]
+    shown = named[:: max(1, -(-len(named) // 20))]  # names of more nodes would overlap
     axes[-1].set_xticks([place for place, _ in shown], [name for _, name in shown], rotation=45)
     return figure
 

@@ -29,10 +29,6 @@ if TYPE_CHECKING:
 
 AUXILIARY = (r"\sigma", r"\zeta", r"\xi", r"\chi")
 """Letters for sums that occur more than once in a law, such as a slip."""
-LARGEST_MATRIX = 6
-"""Coordinates up to which the second-order form is printed as matrices."""
-SHORTEST_SHARED = 3
-"""Operations in a sum from which on it is worth a letter of its own."""
 BALANCES = {ROTATION: "torques", TRANSLATION: "forces", ELECTRICAL: "currents"}
 
 
@@ -135,7 +131,8 @@ class Blocks:
         """M phi'' + D phi' + K phi = T: as matrices where they fit on a page, else row by row."""
         form = self.equations.second_order
         size = len(form.coordinates)
-        lines = tuple(self._matrices(form)) if size <= LARGEST_MATRIX else ()
+        # The matrices of more than six coordinates are wider than a page.
+        lines = tuple(self._matrices(form)) if size <= 6 else ()
         if not lines or max(map(_matrix_width, lines)) > LINE_WIDTH:
             lines = tuple(self._motions(form))
         yield Block("Equations of motion", lines)
@@ -205,7 +202,7 @@ class Blocks:
         graph = self.equations.form.graph
         parameters = {letter.name for letter in self.equations.letters if letter.parameter}
         order = sorted(names, key=lambda name: name not in parameters)
-        ordered = with_rates({name: names[name] for name in order}, self.equations.source.rate_of)
+        ordered = with_rates({name: names[name] for name in order}, self.equations.notation.rate_of)
         values = self.equations.values if self.values else {}
         printed = {**ordered, **_dotted(self.equations)}
         angles = map(self.equations.assembly.quantities.angle, range(len(graph.nodes)))
@@ -312,7 +309,8 @@ def _to_rounding(expression: Expr) -> Expr:
 def _shared_sums(terms: tuple[Expr, ...], owner: str) -> tuple[tuple[tuple[Symbol, Expr], ...], tuple[Expr, ...]]:
     """Long sums that occur several times in a law, under symbols of their own, and the law with these symbols."""
     counted = Counter(node for term in terms for node in preorder_traversal(term) if node.is_Add)
-    candidates = [node for node, times in counted.items() if times > 1 and node.count_ops() >= SHORTEST_SHARED]
+    # a sum of fewer operations is not worth a letter
+    candidates = [node for node, times in counted.items() if times > 1 and node.count_ops() >= 3]
     shared: list[tuple[Symbol, Expr]] = []
     for node in candidates[: len(AUXILIARY) - 1]:
         letter = Symbol(f"{owner}, sum {len(shared) + 1}", real=True)

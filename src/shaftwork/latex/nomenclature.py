@@ -20,10 +20,6 @@ if TYPE_CHECKING:
     from shaftwork.equations.records import Equations
 
 LAWS = "Formula, or points of a table, over $t$ in s if nothing else is said"
-ALL_DIGITS = 15
-"""Of the points of tables, which may lie close together."""
-POINTS = 40
-"""Of a table in one row: rows do not run over pages."""
 UNITS = {"1": "--", "ohm": r"$\Omega$"}
 Cells = tuple[str, ...]
 
@@ -102,11 +98,13 @@ def _laws(equations: Equations) -> Iterator[Cells]:
                 continue
             cells = [] if isinstance(law, Table) else [_formula(writer.latex(law))]
             for curve in sorted(law.atoms(Table), key=str):
+                # in all digits, as points may lie close together
                 points = [
-                    rf"${printed_number(x, ALL_DIGITS)} \mapsto {printed_number(y, ALL_DIGITS)}$"
+                    rf"${printed_number(x, 15)} \mapsto {printed_number(y, 15)}$"
                     for x, y in zip(curve.xs, curve.ys, strict=True)
                 ]
-                cells += [", ".join(points[first : first + POINTS]) for first in range(0, len(points), POINTS)]
+                # 40 in a row: rows do not run over pages
+                cells += [", ".join(points[first : first + 40]) for first in range(0, len(points), 40)]
             heads = [(in_text(declared.meaning), breakable(part.name), unit(declared.unit))]
             for (meaning, owner, measure), cell in zip_longest(heads, cells, fillvalue=("", "", "")):
                 yield meaning, owner, str(cell), measure

@@ -40,8 +40,6 @@ WIDTHS = {
     r"\cdot": 1.3,
 }
 """Widths in units of an ordinary letter, about 5.7 points at a font size of 11 points."""
-LETTER, CAPITAL, GREEK, DIGIT = 1.0, 1.35, 1.1, 0.95
-SCRIPT_SIZE, SCRIPT_SPACE = 0.75, 0.1
 FUNCTION = re.compile(r"\\(tanh|cosh|sinh|cos|sin|tan|exp|log|sqrt|operatorname|max|min|sign)$")
 OPENS, CLOSES = "\ue002", "\ue003"
 """Stand for the brackets of a group until it is known whether it stays on one line."""
@@ -322,7 +320,7 @@ def _item(item: str, tokens: Iterator[str]) -> float:
         case "{":
             return _width(tokens, one=False)
         case "_" | "^":
-            return SCRIPT_SPACE + SCRIPT_SIZE * _width(tokens, one=True)
+            return 0.1 + 0.75 * _width(tokens, one=True)
         case r"\frac":
             return 0.4 + max(_width(tokens, one=True), _width(tokens, one=True))
         case r"\begin" | r"\end":
@@ -335,5 +333,6 @@ def _item(item: str, tokens: Iterator[str]) -> float:
     if FUNCTION.match(item):
         return 0.9 * len(item)
     if item.isdigit():
-        return DIGIT
-    return GREEK if item.startswith("\\") else CAPITAL if item.isupper() else LETTER
+        return 0.95
+    # widths of Greek and capital letters, measured in those of ordinary ones
+    return 1.1 if item.startswith("\\") else 1.35 if item.isupper() else 1.0

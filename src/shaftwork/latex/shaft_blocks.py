@@ -27,8 +27,6 @@ from shaftwork.network.kinds import Kind
 if TYPE_CHECKING:
     from shaftwork.equations.fields import Field
 
-LARGEST_WRITTEN_OUT = 6
-"""Degree up to which the weights are printed as numbers."""
 LAST_INDEX = re.compile(f"{INDEX_OPENS}[0-9]+{INDEX_CLOSES}(?!.*{INDEX_OPENS})")
 MEANING = r"""Here $\ell_{j}$ are the Lagrange polynomials of the $n + 1$ nodes of Gauss and Lobatto in $[0, 1]$ and
 $h_{j}$ the weights of their quadrature, $y_{k}$ and $\lambda_{k}$ the $n$ nodes and weights of Gauss; $n$ is the degree
@@ -188,10 +186,9 @@ class Sums:
 def sums_of(quantities: Quantities, writer: Writer) -> tuple[Sums, ...]:
     """The general rows of every shaft that has them."""
     shafts = [(part, part.component.resolved) for part in quantities.graph.parts if isinstance(part.component, Shaft)]
+    # up to degree 6 the weights are printed as numbers
     return tuple(
-        Sums(part, model.n, quantities, writer)
-        for part, model in shafts
-        if isinstance(model, Spectral) and model.n > LARGEST_WRITTEN_OUT
+        Sums(part, model.n, quantities, writer) for part, model in shafts if isinstance(model, Spectral) and model.n > 6
     )
 
 
@@ -228,7 +225,7 @@ def _field_letters(field: Field) -> tuple[Letter, ...]:
     parameters = parameter_letters(name, (*component.declared.values(), *field.derived, waves))
     quantities = (("tau", ROTATION.through, ""), ("tau_c", ROTATION.through, "c"), ("omega", ROTATION.across, ""))
     variables = (Letter(f"{name}.{label}", q.latex, mark, q.unit, "") for label, q, mark in quantities)
-    return tuple(map(field.equations.source.written, (*parameters, *variables)))
+    return tuple(map(field.equations.notation.written, (*parameters, *variables)))
 
 
 def _field_names(field: Field) -> dict[str, str]:
@@ -241,7 +238,7 @@ def _field_names(field: Field) -> dict[str, str]:
 def _field_writer(field: Field, atoms: Mapping[Expr, Symbol], *, values: bool) -> Writer:
     """Prints parameters, quantities of the network, and functions of x and t by the symbols that stand for them."""
     equations, letters = field.equations, _field_letters(field)
-    rates = with_rates(equations.symbol_names, equations.source.rate_of)
+    rates = with_rates(equations.symbol_names, equations.notation.rate_of)
     along = {name: latex for shaft in equations.fields for name, latex in _field_names(shaft).items()}
     functions = {symbol.name: _printed(atom, along) for atom, symbol in atoms.items()}
     names = {**along, **functions, **{name: latex for name, latex in rates.items() if name not in along}}

@@ -21,7 +21,7 @@ from shaftwork.core.files import replaced
 from shaftwork.modelfiles import textfile
 from shaftwork.modelfiles.textfile import ModelText, PartText
 from shaftwork.network.expressions import parse
-from shaftwork.network.grammar import COMPARISONS, FUNCTION_NAMES, FUNCTIONS, LIMITS, fault_of, words_of
+from shaftwork.network.grammar import COMPARISONS, FUNCTION_NAMES, FUNCTIONS, LIMITS, fault_of, tokens_of
 from shaftwork.network.netlist import Netlist, Origin, Placed, title
 
 _SIGNS = {relation: sign for sign, relation in COMPARISONS.items()}
@@ -104,7 +104,7 @@ def _refuse_endless_laws(model: ModelText) -> None:
             if not isinstance(value, str) or not _is_law(REGISTRY.get(part.type), name):
                 continue
             try:
-                words += len(words_of(value))
+                words += len(tokens_of(value))
             except ModelFileError as error:
                 raise _fault(part, name, f"{name}: {error}") from None
             if words > LIMITS.file_words:

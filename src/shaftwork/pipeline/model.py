@@ -65,8 +65,6 @@ if TYPE_CHECKING:
 
 VARIANTS = 8
 """Models of other structure, and choices of an engine, that are kept for later calls."""
-SIMILAR = 5.0
-"""An engine suits parameters that differ by less than this factor too: looking anew would cost more than the run."""
 
 
 class Model(EngineModel):
@@ -312,7 +310,9 @@ class Model(EngineModel):
             return "sundials" if available("sundials") else "scipy-radau", IMPLICIT
         key = (problem.t0, problem.t_end, problem.rtol)
         for run, p, chosen in self._choices:
-            if run == key and ((p / SIMILAR < prepared.p) == (prepared.p < p * SIMILAR)).all():
+            # Parameters that differ by less than a factor of 5 suit the same engine: looking anew would cost more than
+            # the run.
+            if run == key and ((p / 5.0 < prepared.p) == (prepared.p < p * 5.0)).all():
                 return chosen
         chosen = choice.choose(problem)
         self._choices = [*self._choices[1 - VARIANTS :], (key, prepared.p, chosen)]

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from shaftwork.frequency.natural_modes import Modes
     from shaftwork.lagrange.lagrange import Lagrangian
 
-MOST_SHOWN = 200
-"""Parts up to which a notebook shows the drawing of a network by itself."""
 LOOP = "algebraic loop"
 """The kind of problem that `algebraic_loops="solve"` accepts."""
 
@@ -276,7 +274,7 @@ class Network(NetworkBuilder):
 
     def _repr_html_(self) -> str | None:
         """What a notebook shows; nothing but the text where the network cannot be drawn, or is too large to be read."""
-        if len(self.netlist().placed) > MOST_SHOWN:
+        if len(self.netlist().placed) > 200:
             return None
         try:
             with muted(NetworkWarning):

@@ -19,14 +19,6 @@ from shaftwork.results.solution import Solution
 
 HIDDEN = 10.0
 """A state is hidden where its absolute tolerance is more than this many times its relative one at its largest."""
-ROUNDING = 1e-14
-"""Part of the size of all states together by which a step moves each of them at random."""
-ATTEMPTS = 5
-"""A motion that was hidden altogether shows its size after two or three runs."""
-ENOUGH = 64
-"""So many outputs show how large a motion is; fewer are no reason to look at the steps of heyoka, which costs a run."""
-LOOSEST = 1e-10
-"""The tolerance of heyoka, where no tighter one is asked for; it is absolute while all states are below one."""
 
 
 def in_its_size(form: StateForm, prepared: Prepared, demand: Demand, run: Callable[[Demand], Solution]) -> Solution:
@@ -42,7 +34,8 @@ def in_its_size(form: StateForm, prepared: Prepared, demand: Demand, run: Callab
         run: makes the motion.
     """
     motion = run(demand)
-    for _ in range(ATTEMPTS):
+    # Even a motion that was hidden altogether shows its size after two or three runs.
+    for _ in range(5):
         sizes = None if demand.atol is not None else _hidden(motion, form, demand, prepared.atol)
         if sizes is None:
             break
@@ -58,7 +51,8 @@ def _hidden(motion: Solution, form: StateForm, demand: Demand, tolerances: Array
     largest, rtol = _largest(motion), demand.rtol
     overall = max(largest.values())
     if motion.engine == "heyoka":
-        absolute = min(rtol, LOOSEST) * demand.sizes.overall
+        # heyoka takes no looser tolerance, and takes it as absolute while all states are below one
+        absolute = min(rtol, 1e-10) * demand.sizes.overall
         return (
             Sizes(overall=10.0 ** math.floor(math.log10(overall))) if absolute > HIDDEN * rtol * overall > 0 else None
         )
@@ -68,7 +62,8 @@ def _hidden(motion: Solution, form: StateForm, demand: Demand, tolerances: Array
     ordinary = tolerances / NOMINAL
     speed = (reached / ordinary)[~is_angle].max(initial=0.0) or (reached / ordinary).max(initial=0.0)
     step = (demand.span[1] - demand.span[0]) / max(1, motion.statistics.get("steps", 1))
-    floor = ROUNDING / rtol * speed * ordinary * np.where(is_angle, min(1.0, step), 1.0)
+    # A step moves each state at random by 1e-14 of the size of all.
+    floor = 1e-14 / rtol * speed * ordinary * np.where(is_angle, min(1.0, step), 1.0)
     if not ((reached > floor) & (NOMINAL * usual > HIDDEN * reached)).any():
         return None
     sizes = np.minimum(np.maximum(reached, floor), usual).tolist()
@@ -77,7 +72,8 @@ def _hidden(motion: Solution, form: StateForm, demand: Demand, tolerances: Array
 
 def _largest(motion: Solution) -> dict[str, float]:
     """The largest absolute value of all that is stored."""
-    enough = motion.engine == "heyoka" or len(motion.t) >= ENOUGH
+    # 64 outputs show how large a motion is. With fewer the steps are read, but not those of heyoka, which cost a run.
+    enough = motion.engine == "heyoka" or len(motion.t) >= 64
     x = motion.x if enough else motion.dense(motion.steps)
     return dict(zip(motion.states, np.abs(x[:, : len(motion.states)]).max(axis=0).tolist(), strict=True))
 

@@ -18,25 +18,17 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 
 RPM = 30 / np.pi
 """1/min of a rad/s."""
-AT_ONCE = 4_000_000
-"""Numbers that are read of a motion at once, 32 MB."""
 Read = Callable[[Array], Array]
 """From ascending times (k,) to the values of a quantity there."""
 ASIDE = (1e-13, 1e-11, 1e-9, 1e-7, 1e-6)
 """How far aside a value is looked for, of the time or of 1 s, and of a shorter run of that."""
-SAME = 1e-4
-"""A value that is the same but for this fraction of it at twice the distance is what the quantity goes to, to so many
-digits; one that falls as a power of the distance goes to zero where what that power leaves is below this fraction."""
-SLOWEST = 0.95
-"""Of a difference is left at half the distance, at most, where a power of the distance falls: the 13th root leaves so
-much, and what falls more slowly cannot be told from a pole of the logarithm."""
 ANGLES = ("phi", "s", "psi")
 """Integrals of speeds and voltages, which are recorded when asked for."""
 
 
 def blocks(count: int, width: int) -> Iterator[slice]:
     """Places 0 to `count` in blocks, of as many as are read at once where each holds `width` numbers."""
-    rows = max(1, AT_ONCE // max(1, width))
+    rows = max(1, 4_000_000 // max(1, width))  # numbers in 32 MB
     return (slice(first, min(first + rows, count)) for first in range(0, count, rows))
 
 
@@ -304,10 +296,14 @@ def beside(read: Callable[[Array], Array], times: Array, steps: Array) -> tuple[
             values[-1][order] = read(aside[order])
         with np.errstate(invalid="ignore", divide="ignore"):
             left = (values[1] - values[0]) / (values[2] - values[1])  # of each difference at half the distance
-            falls = (left > 0) & (left < SLOWEST)
+            # The 13th root leaves so much; what falls more slowly cannot be told from a pole of the logarithm.
+            falls = (left > 0) & (left < 0.95)
             goes_to = np.where(falls, values[0] - (values[1] - values[0]) * left / (1 - left), values[0])
-            settles = np.isnan(limit) & (np.abs(values[0] - values[1]) <= SAME * np.abs(values[0]))
-            vanishes = np.isnan(limit) & falls & (np.abs(goes_to) <= SAME * np.abs(values[0]))
+            # A value that is the same to four digits at twice the distance is what the quantity goes to; one that falls
+            # as a power of the distance goes to zero where what that power leaves is below this part of it.
+            same = 1e-4
+            settles = np.isnan(limit) & (np.abs(values[0] - values[1]) <= same * np.abs(values[0]))
+            vanishes = np.isnan(limit) & falls & (np.abs(goes_to) <= same * np.abs(values[0]))
         limit[settles] = goes_to[settles]
         limit[vanishes] = 0.0
         empty = np.isnan(near) & np.isfinite(values[0])

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
 COMPILED = ("dense", "observer")
 """What of a motion holds compiled code."""
-ALIKE = 1e-6
-"""Two runs of one motion at the usual tolerance differ by less of the largest value of a state."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +111,8 @@ class Solution:
         inside = np.append(self.t[1:] != self.t[:-1], True)  # of two sides the later one
         off = np.abs(motion.dense(self.t[inside]) - self.x[inside]).max(axis=0)
         share = float((off / np.maximum(np.abs(self.x).max(axis=0), np.finfo(float).tiny)).max())
-        if share > ALIKE:
+        # Two runs of one motion at the usual tolerance differ by less of the largest value of a state.
+        if share > 1e-6:
             warn(
                 f"The stored motion of '{self.name}' was made again to be read, by other versions or on another "
                 f"machine: its states differ by up to {share:.1e} of their largest value.",

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 
 SHOWN = 12
 """Rows of a printed table."""
-MOST_LINES = 2000
-"""Lines of a picture; more would hide each other."""
 VERDICTS = ("passed", "reason")
 """Columns of the table behind those of parameters and measures."""
 
@@ -172,7 +170,7 @@ def _parallel_coordinates(sweep: Sweep, names: tuple[str, ...]) -> Figure:
     figure = new_figure("Sweep.plot()", 2.2 * max(len(shown), 2), 4.8)
     from matplotlib.collections import LineCollection
 
-    rows = np.flatnonzero(~sweep.failed)[:MOST_LINES]
+    rows = np.flatnonzero(~sweep.failed)[:2000]  # more lines would hide each other
     low = {name: float(columns[name][rows].min(initial=np.inf)) for name in shown} if rows.size else {}
     size = {name: (float(columns[name][rows].max()) - low[name]) or 1.0 for name in low}
     axes = figure.subplots()

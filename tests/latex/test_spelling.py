@@ -13,7 +13,7 @@ from shaftwork.components.mechanics import Inertia, Spring
 from shaftwork.equations.spelling import ACCENTED, chosen_subscript, escaped, in_text
 from shaftwork.network.netlist import NetworkBuilder
 from tests.equations.networks import equations_of
-from tests.equations.test_latex import compile_latex, compiles, overfull, symbols
+from tests.latex.test_equations_in_print import compile_latex, compiles, overfull, symbols
 
 HOSTILE = (
     r"1}\input{/etc/passwd}{",

@@ -25,9 +25,6 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.formulation.explicit_rows import Rows
 
-SHORTEST = 4
-"""Fewer equal rows are written one by one."""
-
 
 @dataclass(frozen=True)
 class Stencil:
@@ -49,19 +46,24 @@ def near(distance: int) -> Symbol:
     return Symbol(f"x[i{distance:+d}]", real=True)
 
 
-def runs_of(rows: Rows) -> tuple[Stencil, ...]:
+def stencils_of(rows: Rows) -> tuple[Stencil, ...]:
     """The rows of all states, equal ones together."""
     place = {symbol: k for k, symbol in enumerate(rows.states)}
-    runs: list[Stencil] = []
+    stencils: list[Stencil] = []
     for i, rate in enumerate(rows.rates):
         relative = rate.xreplace({s: near(place[s] - i) for s in rate.free_symbols if s in place})
-        if runs and runs[-1].rate == relative:
-            runs[-1] = replace(runs[-1], count=runs[-1].count + 1)
+        if stencils and stencils[-1].rate == relative:
+            stencils[-1] = replace(stencils[-1], count=stencils[-1].count + 1)
         else:
-            runs.append(Stencil(i, 1, relative))
+            stencils.append(Stencil(i, 1, relative))
     written: list[Stencil] = []
-    for run in runs:
-        written += [run] if run.count >= SHORTEST else [Stencil(run.first + k, 1, run.rate) for k in range(run.count)]
+    for stencil in stencils:
+        # Fewer than four equal rows are written one by one.
+        written += (
+            [stencil]
+            if stencil.count >= 4
+            else [Stencil(stencil.first + k, 1, stencil.rate) for k in range(stencil.count)]
+        )
     return tuple(written)
 
 
@@ -108,10 +110,10 @@ class _Language:
         head: what stands before everything; {states} and {parameters} stand for how many there are.
         constant: a line that names what parameters tell.
         single: a line for one row; by place and rate.
-        loop: the lines of a run; by first place, place behind the last and rate.
+        loop: the lines of a stencil; by first place, place behind the last and rate.
         foot: the lines behind everything.
-        state: a state, by the run in which it stands and its distance from the row.
-        view: a line before a run for each state that it reads, from its first place to behind its last.
+        state: a state, by the stencil in which it stands and its distance from the row.
+        view: a line before a stencil for each state that it reads, from its first place to behind its last.
     """
 
     printer: type[Any]
@@ -124,18 +126,18 @@ class _Language:
     view: str = ""
 
 
-def _indexed(run: Stencil, distance: int) -> str:
-    return f"x[{run.first + distance}]" if run.count == 1 else f"x[i{f'{distance:+d}' if distance else ''}]"
+def _indexed(stencil: Stencil, distance: int) -> str:
+    return f"x[{stencil.first + distance}]" if stencil.count == 1 else f"x[i{f'{distance:+d}' if distance else ''}]"
 
 
-def _viewed(run: Stencil, distance: int) -> str:
-    first = run.first + distance
-    return f"x[{first}]" if run.count == 1 else f"x{first}[i]"
+def _viewed(stencil: Stencil, distance: int) -> str:
+    first = stencil.first + distance
+    return f"x[{first}]" if stencil.count == 1 else f"x{first}[i]"
 
 
-def _sliced(run: Stencil, distance: int) -> str:
-    first = run.first + distance
-    return f"x[{first}]" if run.count == 1 else f"x[{first}:{first + run.count}]"
+def _sliced(stencil: Stencil, distance: int) -> str:
+    first = stencil.first + distance
+    return f"x[{first}]" if stencil.count == 1 else f"x[{first}:{first + stencil.count}]"
 
 
 _NUMPY = """from functools import reduce
@@ -240,7 +242,7 @@ class MachineCode:
         return rates
 
 
-class RunProgram:
+class LoopedSource:
     """The loops of a right-hand side.
 
     Args:
@@ -252,12 +254,12 @@ class RunProgram:
         self._rows, self._title = rows, title
 
     @cached_property
-    def _runs(self) -> tuple[tuple[Stencil, ...], dict[Symbol, Basic]]:
-        """The runs in terms of what parameters alone tell, and that by symbols."""
-        runs, symbols = runs_of(self._rows), dict[Basic, Symbol]()
-        free = dict.fromkeys(symbol for run in runs for symbol in run.rate.free_symbols)
+    def _stencils(self) -> tuple[tuple[Stencil, ...], dict[Symbol, Basic]]:
+        """The stencils in terms of what parameters alone tell, and that by symbols."""
+        stencils, symbols = stencils_of(self._rows), dict[Basic, Symbol]()
+        free = dict.fromkeys(symbol for stencil in stencils for symbol in stencil.rate.free_symbols)
         moving = [symbol for symbol in free if symbol not in self._rows.parameters]
-        fixed = Fixed(self._rows.parameters, moving, [run.rate for run in runs])
+        fixed = Fixed(self._rows.parameters, moving, [stencil.rate for stencil in stencils])
 
         def taken_out(node: Any) -> Any:
             """With symbols in place of its largest parts of parameters alone."""
@@ -267,7 +269,7 @@ class RunProgram:
                 return node
             return node.func(*map(taken_out, fixed.arguments(node)))
 
-        rates = tuple(replace(run, rate=taken_out(run.rate)) for run in runs)
+        rates = tuple(replace(stencil, rate=taken_out(stencil.rate)) for stencil in stencils)
         return rates, {symbol: part for part, symbol in symbols.items()}
 
     def source(self, language: str) -> str:
@@ -279,7 +281,7 @@ class RunProgram:
         """
         if not isinstance(language, str) or language not in _LANGUAGES:
             raise ParameterError(f"There is no source in {language!r}. Take one of: {', '.join(map(repr, LANGUAGES))}.")
-        form, (runs, constants) = _LANGUAGES[language], self._runs
+        form, (stencils, constants) = _LANGUAGES[language], self._stencils
         names: dict[Basic, str] = {TIME: "t"}
         names |= {symbol: f"p[{k}]" for k, symbol in enumerate(self._rows.parameters)}
         names |= {symbol: str(symbol.name) for symbol in constants}
@@ -290,13 +292,17 @@ class RunProgram:
             form.constant.format(name=symbol.name, value=self._printed(values, value))
             for symbol, value in constants.items()
         ]
-        for run in runs:
-            read = {symbol: form.state(run, distance) for symbol, distance in _read(run.rate)}
-            rate = self._printed(form.printer({**names, **read}), run.rate)
-            written = (form.single,) if run.count == 1 else form.loop
-            begins = [run.first + distance for _, distance in _read(run.rate)] if form.view and run.count > 1 else []
-            lines += [form.view.format(first=begin, last=begin + run.count) for begin in begins]
-            span = {"first": run.first, "last": run.first + run.count, "count": run.count}
+        for stencil in stencils:
+            read = {symbol: form.state(stencil, distance) for symbol, distance in _read(stencil.rate)}
+            rate = self._printed(form.printer({**names, **read}), stencil.rate)
+            written = (form.single,) if stencil.count == 1 else form.loop
+            begins = (
+                [stencil.first + distance for _, distance in _read(stencil.rate)]
+                if form.view and stencil.count > 1
+                else []
+            )
+            lines += [form.view.format(first=begin, last=begin + stencil.count) for begin in begins]
+            span = {"first": stencil.first, "last": stencil.first + stencil.count, "count": stencil.count}
             lines += [line.format(rate=rate, **span) for line in written]
         return "\n".join((*lines, *form.foot, ""))
 

@@ -20,10 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from shaftwork.codegen.array_form.elements import SAME, Array, Index, blocks
+from shaftwork.codegen.array_form.elements import Array, Index, blocks
 from shaftwork.codegen.array_form.inputs import Inputs
 from shaftwork.codegen.array_form.matrices import LinearPart
 from shaftwork.core.errors import SimulationError
+from shaftwork.numerics.tolerances import TYPED
 
 ITERATIONS = 50
 """Newton's steps, and halves of each."""
@@ -118,7 +119,7 @@ class LoopSolver:
             solutions = np.column_stack([last, a])
             solved = np.where(np.isfinite(solutions).all(axis=0), np.arange(solutions.shape[1]), 0)
             ends = solutions[:, np.maximum.accumulate(solved)]  # where there is none, the last one that there was
-            least = SAME * np.abs(ends).max(axis=1, keepdims=True)
+            least = TYPED * np.abs(ends).max(axis=1, keepdims=True)
             other = np.flatnonzero((np.abs(ends[:, :-1] - starts) > least).any(axis=0))
             if not other.size:
                 self._last = ends[:, -1]

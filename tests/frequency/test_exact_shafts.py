@@ -11,6 +11,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 import shaftwork as sw
+from shaftwork.components.shaft_models import ShaftModel
 from shaftwork.frequency import exact_spectrum
 from tests.properties.examples import share_of_examples
 from tests.reference.exact_shafts.exact_response import frequency_response
@@ -25,7 +26,7 @@ ROUNDING = 1e-11
 """Of rates and amplitudes; a mesh of 24 to 40 elements is converged to it, and the condition of some is 1e4."""
 
 
-def _train(model: sw.ShaftModel, J: tuple[float, float] = (0.025, 0.11), **values: float) -> sw.Network:
+def _train(model: ShaftModel, J: tuple[float, float] = (0.025, 0.11), **values: float) -> sw.Network:
     net = sw.Network("train")
     net.add(sw.TorqueSource("motor", tau=0.0), "m")
     net.add(sw.Inertia("Je", J=J[0]), "m")
@@ -35,7 +36,7 @@ def _train(model: sw.ShaftModel, J: tuple[float, float] = (0.025, 0.11), **value
     return net
 
 
-def _branched(model: sw.ShaftModel, **values: float) -> sw.Network:
+def _branched(model: ShaftModel, **values: float) -> sw.Network:
     """A hollow shaft, a gear, and behind it two equal branches of two steps each: half of the modes come in pairs."""
     net = sw.Network("branched")
     net.add(sw.TorqueSource("motor", tau=0.0), "m")
@@ -52,7 +53,7 @@ def _branched(model: sw.ShaftModel, **values: float) -> sw.Network:
     return net
 
 
-def _crane(model: sw.ShaftModel, *, rotor: bool = True) -> sw.Network:
+def _crane(model: ShaftModel, *, rotor: bool = True) -> sw.Network:
     """A motor with a falling curve, a load that grows with speed, a gear between shafts of very different stiffness."""
     net = sw.Network("crane")
     net.add(sw.KlossMotor("motor", tau_k=60.0, s_k=0.2, n_sync=3000.0), "m")
@@ -66,7 +67,7 @@ def _crane(model: sw.ShaftModel, *, rotor: bool = True) -> sw.Network:
     return net
 
 
-def _supplied(model: sw.ShaftModel) -> sw.Network:
+def _supplied(model: ShaftModel) -> sw.Network:
     net = sw.Network("supplied")
     net.add(sw.VoltageSource("supply", u=100.0), "plus", "ground")
     net.add(sw.DCMachine("machine", k=0.5, R=0.3, L=0.01), "plus", "ground", "rotor")
@@ -77,7 +78,7 @@ def _supplied(model: sw.ShaftModel) -> sw.Network:
     return net
 
 
-def _held(model: sw.ShaftModel) -> sw.Network:
+def _held(model: ShaftModel) -> sw.Network:
     """Two shafts side by side between a driven node and an inertia, and one to the frame: torques without motion."""
     net = sw.Network("held")
     net.add(sw.SpeedSource("drive", omega=10.0), "a")
@@ -100,7 +101,7 @@ def _assert_equal_rates(found: Any, wanted: Any, tolerance: float = ROUNDING) ->
 )
 @pytest.mark.parametrize("model", [sw.Lumped(3), sw.Wave(), sw.Auto(f_max=10.0, tolerance=0.1)])
 def test_the_reference_shaft_has_its_printed_frequencies_whatever_its_model(
-    J: float, printed: tuple[float, ...], model: sw.ShaftModel
+    J: float, printed: tuple[float, ...], model: ShaftModel
 ) -> None:
     """SOURCES, error 8: eight decimals; those beyond are of the transcendental equation, to rounding."""
     modes = _train(model, (0.025, J)).modes(exact=True)
@@ -507,7 +508,7 @@ _SHAFT = st.tuples(
 def test_random_trains_are_those_of_a_converged_mesh(shafts: list[Any], ratio: float, branched: bool) -> None:  # noqa: FBT001
     """One to three shafts, in a row or from one wheel, hollow, lossy, with or without discs; four half waves each."""
 
-    def network(model: sw.ShaftModel) -> sw.Network:
+    def network(model: ShaftModel) -> sw.Network:
         net = sw.Network("random")
         net.add(sw.Inertia("J", J=0.01), "start")
         net.add(sw.Gear("gear", ratio=ratio), "start", "n0")

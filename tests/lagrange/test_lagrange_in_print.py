@@ -10,8 +10,8 @@ import pytest
 
 import shaftwork as sw
 from shaftwork.lagrange.lagrange import Lagrangian
-from tests.equations.test_lagrange import WHOLE, closed_gears, of
-from tests.equations.test_latex import compile_latex, compiles, overfull
+from tests.lagrange.test_lagrange import WHOLE, closed_gears, of
+from tests.latex.test_equations_in_print import compile_latex, compiles, overfull
 
 
 @pytest.mark.parametrize("name", ["planetary hoist", "prescribed speed behind gears", "torque of angle and speed"])

@@ -12,6 +12,7 @@ from sympy import Derivative, Expr, Function, Symbol, simplify, sqrt
 
 import shaftwork as sw
 from shaftwork.components.laws import t
+from shaftwork.components.shaft_models import ShaftModel
 from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.equations.fields import X
 from shaftwork.equations.kirchhoff import Row
@@ -27,7 +28,7 @@ def symbol(name: str) -> Symbol:
     return Symbol(name, real=True)
 
 
-def his_drive(model: sw.ShaftModel, damping: float = 0.3, bearings: float = 0.02) -> sw.Network:
+def his_drive(model: ShaftModel, damping: float = 0.3, bearings: float = 0.02) -> sw.Network:
     """Motor, shaft and rotating mass, with bearings at both ends."""
     net = sw.Network("Popenda")
     net.add(sw.TorqueSource("motor", tau=TORQUE), "motor end")
@@ -176,7 +177,7 @@ def test_the_paper_form_converges(order: int) -> None:
 
 
 @pytest.mark.parametrize("model", [sw.Lumped(4), sw.Wave(), sw.CentralDifference(6, form="paper")], ids=repr)
-def test_the_shaft_before_it_is_divided_is_his_8_to_15(model: sw.ShaftModel) -> None:
+def test_the_shaft_before_it_is_divided_is_his_8_to_15(model: ShaftModel) -> None:
     M, M_c, omega = (Function(f"line.{name}", real=True)(X, t) for name in ("tau", "tau_c", "omega"))
     J, C, D, v = (symbol(f"line.{name}") for name in ("line_inertia", "line_stiffness", "damping", "v"))
     S_c = 1 / C
@@ -283,7 +284,7 @@ def test_a_notation_names_quantities_that_are_there() -> None:
 
 
 @pytest.mark.parametrize("model", [sw.Wave(), sw.Lumped(3), sw.CentralDifference(4), sw.Spectral(4)], ids=repr)
-def test_a_clamped_end_has_a_speed_and_no_torque(model: sw.ShaftModel) -> None:
+def test_a_clamped_end_has_a_speed_and_no_torque(model: ShaftModel) -> None:
     net = sw.Network("clamped")
     net.add(sw.Inertia("J", J=0.1), "a")
     net.add(sw.Shaft("line", **STEEL, model=model), "a", "ground")

@@ -13,6 +13,7 @@ import sympy
 
 import shaftwork as sw
 from shaftwork.cli import main
+from shaftwork.equations.records import Equations
 
 
 @cache
@@ -27,7 +28,7 @@ def gapped() -> sw.Network:
     return net
 
 
-def entry(equations: sw.Equations, matrix: str, *place: int) -> sympy.Expr:
+def entry(equations: Equations, matrix: str, *place: int) -> sympy.Expr:
     return getattr(equations.second_order, matrix).get(place, 0)
 
 
