@@ -15,7 +15,7 @@ from shaftwork.cli import main
 from shaftwork.latex.printing import printed_number
 from shaftwork.reporting.document import SECTIONS
 from shaftwork.scenes import SCENES
-from tests.latex.test_latex import compile_latex, compiles, overfull
+from tests.latex.test_equations_in_print import compile_latex, compiles, overfull
 
 CHROMIUM = shutil.which("chromium")
 LOADED = re.compile(r"""<(?:script|link|img|iframe)[^>]+(?:src|href)=["'](?!data:|#)""")
