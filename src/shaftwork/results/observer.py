@@ -9,9 +9,9 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from shaftwork.core.errors import AccuracyWarning, SignalError, no_quantity
+from shaftwork.core.errors import AccuracyWarning, ParameterError, SignalError, no_quantity
 from shaftwork.core.notices import muted, warn
-from shaftwork.core.parameters import numbers_in_si
+from shaftwork.core.parameters import in_si, numbers_in_si
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -268,6 +268,22 @@ class Reader:
                 "cycles the values beside it. Give the law a finite slope there.",
                 AccuracyWarning,
             )
+
+
+def span_of(reader: Reader, start: float | None, end: float | None) -> tuple[float, float]:
+    """Start and end of a span of a motion, s.
+
+    Raises:
+        ParameterError: they are none.
+    """
+    begins, ends = float(reader.steps[0]), float(reader.steps[-1])
+    first = begins if start is None else in_si("start", start, "s")
+    last = ends if end is None else in_si("end", end, "s")
+    if not begins <= first < last <= ends:
+        raise ParameterError(
+            f"start = {first:g} s, end = {last:g} s: give a span within the motion, from {begins:g} to {ends:g} s."
+        )
+    return first, last
 
 
 def beside(read: Callable[[Array], Array], times: Array, steps: Array) -> tuple[Array, Array]:

@@ -12,9 +12,9 @@ from scipy.interpolate import PchipInterpolator
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
 from shaftwork.core.screen import in_columns
-from shaftwork.results.observer import RPM, Array, Reader
+from shaftwork.results.observer import RPM, Array, Reader, span_of
 from shaftwork.results.plotting import new_figure
-from shaftwork.spectra.spectrum import number_of, span_of, windowed
+from shaftwork.spectra.spectrum import number_of, windowed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

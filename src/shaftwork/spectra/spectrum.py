@@ -13,7 +13,7 @@ from scipy.signal.windows import hann
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
 from shaftwork.core.screen import in_columns
-from shaftwork.results.observer import Array, Reader
+from shaftwork.results.observer import Array, Reader, span_of
 from shaftwork.results.plotting import new_figure
 
 if TYPE_CHECKING:
@@ -104,22 +104,6 @@ def windowed(values: Array) -> Array:
     mean = (values * window).sum(axis=-1, keepdims=True) / window.sum()
     lines = np.abs(rfft((values - mean) * window)) * 2.0 / window.sum()
     return np.asarray(lines, dtype=float)
-
-
-def span_of(reader: Reader, start: float | None, end: float | None) -> tuple[float, float]:
-    """Start and end of a span of a motion, s.
-
-    Raises:
-        ParameterError: they are none.
-    """
-    begins, ends = float(reader.steps[0]), float(reader.steps[-1])
-    first = begins if start is None else in_si("start", start, "s")
-    last = ends if end is None else in_si("end", end, "s")
-    if not begins <= first < last <= ends:
-        raise ParameterError(
-            f"start = {first:g} s, end = {last:g} s: give a span within the motion, from {begins:g} to {ends:g} s."
-        )
-    return first, last
 
 
 def number_of(reader: Reader, name: str, place: int | None) -> int | None:
