@@ -11,7 +11,7 @@ these equations the engine goes on.
     event iteration     event_iteration           modes change one after another until they are consistent
                         hybrid_state              modes and states at an instant, and which guards are exceeded
                         commutation               diodes that take over what a switch would cut off
-    state transfer      phases.Regimes            what is stored goes over to other modes
+    state transfer      phases.HybridTransfer            what is stored goes over to other modes
     impact              impacts.impacts           speeds that jump where parts meet
                         impacts.collisions        the complementarity problem of their impulses
                         impacts.impulses          impulses on their way through gears that rub
