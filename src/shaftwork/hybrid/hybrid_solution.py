@@ -18,7 +18,7 @@ from shaftwork.components.base import Component
 from shaftwork.hybrid.hybrid_run import HybridRun, Span
 from shaftwork.hybrid.hybrid_state import Change, Regime
 from shaftwork.hybrid.impacts.impulses import summed
-from shaftwork.hybrid.modes.mode_machines import ModeMachine, ModeNames
+from shaftwork.hybrid.modes.mode_machines import ModeMachine
 from shaftwork.results.observer import PhaseRow
 from shaftwork.results.solution import Solution
 
@@ -318,13 +318,13 @@ def _table(run: HybridRun) -> tuple[PhaseRow, ...]:
     by_words: dict[tuple[str, ...], Mapping[str, str]] = {}
 
     @cache
-    def in_words(modes: ModeNames) -> Mapping[str, str]:
-        words = tuple(machine.modes[name].words for machine, name in zip(machines, modes, strict=True))
+    def in_words(regime: Regime) -> Mapping[str, str]:
+        words = tuple(machine.modes[name].words for machine, name in zip(machines, regime.modes, strict=True))
         return by_words.setdefault(words, dict(zip((machine.name for machine in machines), words, strict=True)))
 
     rows: list[tuple[float, Mapping[str, str]]] = []
     for phase, end in zip(phases, [*(phase.start for phase in phases[1:]), last], strict=True):
-        modes = in_words(phase.regime.modes)
+        modes = in_words(phase.regime)
         if end > phase.start and not (rows and rows[-1][1] is modes):
             rows.append((phase.start, modes))
     ends = [*(start for start, _ in rows[1:]), last]

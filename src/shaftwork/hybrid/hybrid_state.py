@@ -1,8 +1,7 @@
-"""A state of a motion through phases: modes, states, how far rounding moves the guards, and which are exceeded."""
+"""A hybrid state: the modes of all machines and the states, how far rounding moves the guards, and which are exceeded."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cached_property, partial
 from types import MappingProxyType
@@ -20,25 +19,17 @@ from shaftwork.components.branches import INTEGRAL
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Leave, Mode
 from shaftwork.formulation.form import StateForm
+from shaftwork.hybrid.consistency import (
+    clear_of_limit,
+    drift,
+    moved_by_rounding,
+    rounding_moves,
+    side_of_limit,
+)
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import ActiveGuard, ModeMachine, ModeNames
 from shaftwork.integrate.problem import Guards, Problem, changed
-from shaftwork.pipeline.arguments import NOMINAL
 from shaftwork.pipeline.model import Model
-
-ROUNDINGS = 64.0
-"""A guard within so many rounding units of zero is on its limit, and only its further course tells its side."""
-CLEAR = 8
-"""A phase that starts at a limit or beyond meets it again where it is farther beyond by so many bands."""
-NOTHING = 1e-200
-"""What is as good as zero, and is not."""
-EPS = float(np.finfo(float).eps)
-AHEAD, AHEAD_OF_RUN = 1e-3, 1e-7
-"""How far ahead the further course is looked at: parts of the time in which a state moves by its nominal size, and of
-the run."""
-GOLDEN = (5**0.5 - 1) / 2
-FEW = 4
-"""What a look ahead gains must be more than so many rounding units."""
 
 Course = tuple[float, list[float], list[float], list[float]]
 """Time, states, their rates, and guards."""
@@ -146,9 +137,7 @@ class Regime:
         """Of each state a part of it and the least that rounding moves it, to both sides and not alike; the side; and
         how far a look ahead takes it.
         """
-        parts = [(-1) ** k * (0.5 + k * GOLDEN % 1) * ROUNDINGS * EPS for k in range(len(self.sizes))]
-        pairs = zip(parts, self.sizes, strict=True)
-        return [(part, part * size / NOMINAL, math.copysign(1.0, part), AHEAD * size) for part, size in pairs]
+        return rounding_moves(self.sizes)
 
     @cached_property
     def values(self) -> Array:
@@ -170,12 +159,9 @@ class Regime:
 
     def beside(self, here: Course, side: float = 1.0) -> tuple[float, list[float]]:
         """The time and the states as far away as rounding may move them, to one side or to the other, -1."""
-        t, x, rates, _ = here
-        each, tick = zip(x, rates, self.moves, strict=True), self.tick
-        # all of it to the same side: what a tick moves must not make up for the rest
-        return t + side * tick, [
-            v + side * (part * abs(v) + least + sign * tick * abs(rate)) for v, rate, (part, least, sign, _) in each
-        ]
+        (t, x, rates, _), tick = here, self.tick
+        triples = zip(x, rates, self.moves, strict=True)
+        return t + side * tick, [moved_by_rounding(v, rate, move, tick, side) for v, rate, move in triples]
 
     def bands(self, here: Course, beside: Sequence[float] | None = None) -> list[float]:
         """How far rounding moves each guard: on the side on which no law switches, where one is about to.
@@ -269,21 +255,6 @@ Transition = tuple[HybridState, list[Change]]
 """The state that follows at an instant, and the changes of mode that lead there."""
 
 
-def clear_of_limit(beyond: float, band: float) -> float:
-    """How far beyond zero a guard is met: more where it is near its limit or beyond, for a phase that starts there has
-    not met it.
-
-    It is not zero: where a value is exactly zero at the start of a step, heyoka finds none of its later zeros in it.
-
-    Args:
-        beyond: how far it is beyond now; negative within its limit.
-        band: how far rounding moves it.
-    """
-    if 2 * beyond > -CLEAR * band:
-        return max(beyond, 0.0) + CLEAR * band or NOTHING
-    return band / CLEAR or NOTHING
-
-
 def exceeded(
     state: HybridState,
     t: float,
@@ -311,14 +282,15 @@ def exceeded(
         wide = list(map(max, bands, ended.bands))
     beyond, on_limit, clear = [], [], [0.0] * len(now)
     for active in regime.watched:
-        band, value = wide[active.guard], active.side * now[active.guard]
-        clear[active.guard] = clear_of_limit(value, bands[active.guard])
-        if value < -band or active in idle:
+        excess = active.side * now[active.guard]
+        clear[active.guard] = clear_of_limit(excess, bands[active.guard])
+        side = side_of_limit(excess, wide[active.guard])
+        if side < 0 or active in idle:
             continue
-        if value <= band or active.leave.rebound is not None:  # only what comes nearer is thrown back
+        if side == 0 or active.leave.rebound is not None:  # only what comes nearer is thrown back
             on_limit.append(active)
-        elif value > 0:
-            beyond.append((value, active))
+        else:
+            beyond.append((excess, active))
     # impacts come first: torques are those of the motion after them
     hits = [excess for excess in beyond if not excess[1].leave.by_torque]
     # then what the time ends: what else gives way shows when all of that has changed
@@ -350,8 +322,7 @@ def leaving(regime: Regime, here: Course, beside: Course, on_limit: list[ActiveG
         for active in on_limit:
             k, side = active.guard, active.side
             gain, other = side * (ahead[3][k] - here[3][k]), side * (ahead_beside[3][k] - beside[3][k])
-            units = abs(beside[3][k] - here[3][k]) / ROUNDINGS
-            if abs(gain) > max(abs(gain - other), FEW * units):
+            if drift(gain, other, abs(beside[3][k] - here[3][k])):
                 moving.append((gain, active))
         beyond = [one for one in moving if one[0] > 0]
         if beyond:
@@ -375,7 +346,8 @@ def passes_limit(state: HybridState, t: float) -> bool:
     """Whether the states are beyond a guard of the modes by more than rounding moves it."""
     now = state.regime.limits(t, state.x.tolist())
     wide = state.bands or [0.0] * len(now)
-    return any(active.side * now[active.guard] > wide[active.guard] for active in state.regime.watched)
+    watched = state.regime.watched
+    return any(side_of_limit(active.side * now[active.guard], wide[active.guard]) > 0 for active in watched)
 
 
 def resting(state: HybridState, t: float) -> dict[int, str]:

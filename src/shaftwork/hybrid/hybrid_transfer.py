@@ -7,8 +7,9 @@ from collections.abc import Callable, Mapping
 
 from shaftwork.core.errors import NetworkError, ParameterError, SimulationError
 from shaftwork.formulation.value_diagnosis import jamming
+from shaftwork.hybrid.consistency import AHEAD_OF_RUN, ROUNDINGS
 from shaftwork.hybrid.equation_sets import EquationSets
-from shaftwork.hybrid.hybrid_state import AHEAD_OF_RUN, ROUNDINGS, HybridState, Regime
+from shaftwork.hybrid.hybrid_state import HybridState, Regime
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import ModeNames, with_modes
 from shaftwork.hybrid.modes.starts import begins_anew

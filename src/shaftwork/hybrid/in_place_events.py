@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array
+from shaftwork.hybrid.consistency import CLEAR, clear_of_limit, side_of_limit
 from shaftwork.hybrid.event_iteration import EventIteration
-from shaftwork.hybrid.hybrid_state import CLEAR, Change, HybridState, Regime, Transition, clear_of_limit
+from shaftwork.hybrid.hybrid_state import Change, HybridState, Regime, Transition
 from shaftwork.hybrid.modes.mode_machines import ActiveGuard, ModeMachine, is_same, with_modes
 from shaftwork.integrate.problem import Reaction, SeriesError
 
@@ -193,10 +194,10 @@ class InPlaceEvents:
         now, near, later = to.near(t, states, to.tick, to.moves, to.longest)
         bands = [0.0] * len(now)
         for guard, side, other in step.watched:
-            beyond, band = side * now[guard], abs(near[guard] - now[guard])
-            if other and (beyond >= -band or beyond >= -before[guard]):
-                return guard if beyond > max(band, before[guard]) else None
-            bands[guard] = clear_of_limit(beyond, band)
+            excess, band, earlier = side * now[guard], abs(near[guard] - now[guard]), before[guard]
+            if other and (where := side_of_limit(excess, max(earlier, band))) >= 0:
+                return guard if where > 0 else None
+            bands[guard] = clear_of_limit(excess, band)
         return now, later, bands, y
 
     def _successor(self, regime: Regime, met: int) -> ModeChange | None:

@@ -10,13 +10,20 @@ import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import CompileError
+from shaftwork.hybrid.consistency import (
+    AHEAD_OF_RUN,
+    ROUNDINGS,
+    clear_of_limit,
+    drift,
+    moved_by_rounding,
+    rounding_moves,
+    side_of_limit,
+)
 from shaftwork.hybrid.equation_sets import EquationSets
 from shaftwork.hybrid.hybrid_model import HybridModel
-from shaftwork.hybrid.hybrid_state import AHEAD, AHEAD_OF_RUN, CLEAR, EPS, FEW, GOLDEN, NOTHING, ROUNDINGS
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import with_modes
 from shaftwork.hybrid.modes.starts import conditional
-from shaftwork.pipeline.arguments import NOMINAL
 from shaftwork.sweep.ensemble import Ensemble
 from shaftwork.sweep.ensemble_equations import EnsembleCode, EnsembleEquations, ModeNames, PhaseEntry, VariantGroup
 from shaftwork.sweep.lane_steps import Mask
@@ -95,7 +102,8 @@ class GuardedEquations(EnsembleEquations):
         super().__init__(code, base, equations.sizes(base), names)
         self.sides = equations.sides(modes)
         self._tick = ROUNDINGS * float(np.spacing(max(map(abs, span))))
-        self._ahead = AHEAD_OF_RUN * (span[1] - span[0])
+        self._longest = AHEAD_OF_RUN * (span[1] - span[0])
+        self._moves = np.array(rounding_moves(self.sizes.tolist())).T[:, :, None]
 
     def entered(self, t: Array, x: Array, p: Array) -> PhaseEntry:
         """Whether every guard is on its own side, or on its limit and about to be, as `EventIteration` would find.
@@ -108,34 +116,24 @@ class GuardedEquations(EnsembleEquations):
         if not len(self.sides):
             return super().entered(t, x, p)
         rates, now = self.code.motion(t, x, p)
-        moved = self._rounded(x, rates)
+        moved = moved_by_rounding(x, rates, self._moves, self._tick)
         near_rates, near = self.code.motion(t + self._tick, moved, p)
         side, bands, step = self.sides[:, None], np.abs(near - now), self._step(rates)
-        value = side * now
-        falls, decided = np.zeros_like(value, dtype=bool), np.zeros_like(value, dtype=bool)
+        excess, turns = side * now, np.zeros(now.shape, dtype=np.intp)
         here, beside = (t, x, rates, now), (t + self._tick, moved, near_rates, near)
         for _ in range(2):  # where nothing moves yet, its acceleration tells
             here, beside = self._later(step, here, p), self._later(step, beside, p)
-            gain, other = side * (here[3] - now), side * (beside[3] - near)
-            sure = np.abs(gain) > np.maximum(np.abs(gain - other), FEW * bands / ROUNDINGS)
-            falls |= ~decided & sure & (gain < 0)
-            decided |= sure
-        good = (value < -bands) | ((value <= bands) & falls)
-        clear = np.where(2 * value > -CLEAR * bands, np.maximum(value, 0.0) + CLEAR * bands, bands)
-        return PhaseEntry(np.all(good[self.watched], axis=0), np.maximum(clear, NOTHING))
-
-    def _rounded(self, x: Array, rates: Array) -> Array:
-        """The states so far away as rounding may move them, and the time by a tick; see `Regime.moves`."""
-        signs = np.array([(-1.0) ** k for k in range(len(x))])[:, None]
-        part = signs * np.array([(0.5 + k * GOLDEN % 1) * ROUNDINGS * EPS for k in range(len(x))])[:, None]
-        least = part * self.sizes[:, None] / NOMINAL
-        return np.asarray(x + part * np.abs(x) + least + signs * self._tick * np.abs(rates))
+            drifts = drift(side * (here[3] - now), side * (beside[3] - near), bands)
+            turns = np.where(turns == 0, drifts, turns)
+        where = side_of_limit(excess, bands)
+        good = (where < 0) | ((where == 0) & (turns < 0))
+        return PhaseEntry(np.all(good[self.watched], axis=0), clear_of_limit(excess, bands))
 
     def _step(self, rates: Array) -> Array:
-        """(k,) how far in s the further course is looked at."""
+        """(k,) how far in s the further course is looked at; see `Regime.ahead`."""
         with np.errstate(divide="ignore"):
-            steps = (AHEAD * self.sizes[:, None] / np.abs(rates)).min(axis=0)
-        return np.asarray(np.minimum(self._ahead, steps))
+            steps = (self._moves[3] / np.abs(rates)).min(axis=0)
+        return np.asarray(np.minimum(self._longest, steps))
 
     def _later(self, step: Array, course: Course, p: Array) -> Course:
         """A step further along a straight line."""

@@ -31,7 +31,8 @@ from shaftwork.components.branches import ACROSS
 from shaftwork.components.modes import Leave
 from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import SimulationError
-from shaftwork.hybrid.hybrid_state import CLEAR, NOTHING, HybridState, Regime
+from shaftwork.hybrid.consistency import CLEAR, NOTHING
+from shaftwork.hybrid.hybrid_state import HybridState, Regime
 from shaftwork.hybrid.hybrid_transfer import HybridTransfer
 from shaftwork.hybrid.impacts.impulses import NOTHING_OF, Blow, ImpactStage, ImpactStart, Impulses, summed
 from shaftwork.hybrid.modes.mode_equations import KEPT

@@ -9,7 +9,8 @@ from shaftwork.codegen.model_observer import Impact
 from shaftwork.components.branches import INTEGRAL
 from shaftwork.components.modes import Leave, Mode
 from shaftwork.core.errors import NetworkError, SimulationError
-from shaftwork.hybrid.hybrid_state import CLEAR, Change, HybridState, Transition, differences
+from shaftwork.hybrid.consistency import CLEAR
+from shaftwork.hybrid.hybrid_state import Change, HybridState, Transition, differences
 from shaftwork.hybrid.hybrid_transfer import HybridTransfer
 from shaftwork.hybrid.impacts.collisions import Collisions, in_turn, opens_at, touching
 from shaftwork.hybrid.impacts.impulses import Blow, ImpactStage, Impulses

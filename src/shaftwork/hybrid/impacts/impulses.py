@@ -19,10 +19,12 @@ from shaftwork.codegen.array_form.recovery import BranchHistory
 from shaftwork.components.branches import ACROSS, through_of
 from shaftwork.components.modes import Leave, Mode
 from shaftwork.core.errors import NetworkError, SimulationError
-from shaftwork.hybrid.hybrid_state import EPS, ROUNDINGS, HybridState, Regime
+from shaftwork.hybrid.consistency import ROUNDINGS
+from shaftwork.hybrid.hybrid_state import HybridState, Regime
 from shaftwork.hybrid.hybrid_transfer import HybridTransfer
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import ModeNames, with_modes
+from shaftwork.numerics.tolerances import EPS
 
 MOST_STAGES = 100
 """So many times gears may come to rest in one impact."""
