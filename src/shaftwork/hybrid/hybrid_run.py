@@ -31,7 +31,7 @@ from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, with_modes
 from shaftwork.hybrid.modes.starts import refuse_incomplete, warn_of_what_may_have_begun
 from shaftwork.integrate import choice
-from shaftwork.integrate.problem import Problem, SeriesError, StickingError, Trajectory, changed
+from shaftwork.integrate.problem import Problem, SeriesError, Trajectory, changed
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.implicit import PRESCRIBED, without_states
 from shaftwork.pipeline.motion_start import Ending
@@ -327,34 +327,26 @@ class HybridRun:
         name, why = self._engine(state, lambda: problem)
         if self.waves is not None:
             return self._solve(problem, name, why, self.waves.solver(state.regime)), in_place
-        stiff = name != "heyoka"
+        stiff, most = name != "heyoka", problem.max_steps
         if self.demand.engine != "auto" or (stiff and not self.equation_sets.tries_heyoka(state.regime.equations)):
             return self._solve(problem, name, why), in_place
-        most = problem.max_steps
-        tried, last = [("heyoka", min(most, choice.patience(problem)) if stiff else most)], name
-        sticks: StickingError | None = None
-        failed: SeriesError | None = None
-        for engine, steps in tried:
-            try:
-                because = why if failed is None else choice.no_series(failed, engine)
-                return self._solve(changed(problem, max_steps=steps), engine, because), in_place
-            except SimulationError as error:
-                failed = error if isinstance(error, SeriesError) and not stiff else failed
-                sticks = error if isinstance(error, StickingError) else sticks
-                if engine == "heyoka" and not stiff and not isinstance(error, SeriesError):
-                    raise
-                if isinstance(error, StickingError) and error.driven_back:
-                    raise
-            if engine == "heyoka" and not stiff:  # only then: whether an engine is installed takes a while to tell
-                *others, (last, _) = choice.without_series(most)
-                tried += others
+
+        def anew(engine: str, steps: int, because: str) -> tuple[Trajectory, InPlaceEvents]:
             del self.changes[noted:]
             self._soon = [*soon]
-            in_place = InPlaceEvents(self.event_iteration, state, t, self.note)
-            problem = changed(problem, react=in_place)
-        if sticks is not None and len(tried) > 1:
-            raise sticks
-        return self._solve(problem, last, why if failed is None else choice.no_series(failed, last)), in_place
+            events = InPlaceEvents(self.event_iteration, state, t, self.note)
+            return self._solve(changed(problem, react=events, max_steps=steps), engine, because), events
+
+        steps = min(most, choice.patience(problem)) if stiff else most
+        try:
+            return self._solve(changed(problem, max_steps=steps), "heyoka", why), in_place
+        except SimulationError as error:
+            failed = error
+        if isinstance(failed, SeriesError) and not stiff:
+            return choice.without_series(anew, failed, most)
+        if not stiff or choice.is_driven_back(failed):
+            raise failed
+        return anew(name, most, why)
 
     def _solve(
         self, problem: Problem, name: str, why: str, solver: Callable[[Problem], Trajectory] | None = None

@@ -1,4 +1,4 @@
-"""A hybrid state: the modes of all machines and the states, how far rounding moves the guards, and which are exceeded."""
+"""A hybrid state: the modes of all machines, and the states; how far rounding moves guards, and which are exceeded."""
 
 from __future__ import annotations
 
