@@ -11,7 +11,7 @@ from sympy import Expr
 from shaftwork.components.branches import ACROSS, THROUGH
 from shaftwork.core.errors import NetworkError
 from shaftwork.hybrid.hybrid_state import Change, HybridState, Transition, exceeded
-from shaftwork.hybrid.hybrid_transfer import HybridTransfer, anew
+from shaftwork.hybrid.hybrid_transfer import HybridTransfer, mode_anew
 from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, ModeMachine, ModeNames, with_modes
 
 MOST = 500
@@ -30,7 +30,7 @@ class Commutation:
 
     def commutated(self, state: HybridState, t: float, modes: ModeNames) -> tuple[HybridState, dict[int, str]]:
         """The modes that are wanted, and what then takes over a torque or current that they would cut off."""
-        plain = self._transfer.changed(state, t, modes)
+        plain = self._transfer.to_modes(state, t, modes)
         names = plain.regime.stores.through
         if plain.x is not state.x and names and not self._keeps(t, state, plain, names):
             for other, changed in self._keeping(t, state, modes, takeovers(self._machines, modes), names):
@@ -50,7 +50,7 @@ class Commutation:
             k = active.machine
             met = active.leave.by_time and active.side * now[active.guard] >= -(bands[active.guard] if bands else 0.0)
             if k not in changed and met and self._machines[k].is_switch:
-                changed[k] = active.leave.to or anew(state, after, k)
+                changed[k] = active.leave.to or mode_anew(state, after, k)
         new_modes, names = with_modes(modes, changed), state.regime.stores.names
         # diodes that begin to conduct, and those that no longer do
         options = [*_led(self._machines, new_modes, ACROSS), *_led(self._machines, new_modes, -THROUGH)]
@@ -74,7 +74,7 @@ class Commutation:
         """Of modes with other ones of diodes those in which what is stored under some names goes on."""
         for pairs in sets:
             with suppress(NetworkError):
-                other = self._transfer.changed(state, t, with_modes(modes, pairs))
+                other = self._transfer.to_modes(state, t, with_modes(modes, pairs))
                 if self._keeps(t, state, other, names):
                     yield other, pairs
 

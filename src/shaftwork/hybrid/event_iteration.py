@@ -21,7 +21,7 @@ from shaftwork.hybrid.hybrid_state import (
     passes_limit,
     resting,
 )
-from shaftwork.hybrid.hybrid_transfer import HybridTransfer, anew, refuse_beyond
+from shaftwork.hybrid.hybrid_transfer import HybridTransfer, mode_anew, refuse_beyond
 from shaftwork.hybrid.impacts.impacts import Impacts
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import ActiveGuard, ModeNames, limited, with_modes
@@ -55,7 +55,7 @@ class EventIteration:
         self._commutation = Commutation(self._transfer)
         self.jumped, self.possible = self._impacts.jumped, self._transfer.possible
 
-    def started(self, t: float, x: Array, joins: Mapping[int, str] = MappingProxyType({})) -> HybridState:
+    def in_start_modes(self, t: float, x: Array, joins: Mapping[int, str] = MappingProxyType({})) -> HybridState:
         """The modes in which a motion starts, from the states of the equations in which no mode joins anything.
 
         A machine that nothing else lets start in its mode, as a friction that a prescribed speed is about to turn,
@@ -74,18 +74,18 @@ class EventIteration:
         regime, modes = loose.regime, loose.regime.modes
         wanted = with_modes(regime.equations.first_modes(t, x, regime.p), joins)
         if self.possible(wanted):
-            return self._transfer.changed(loose, t, wanted)
+            return self._transfer.to_modes(loose, t, wanted)
         # of switches the time tells, so that others give way
         for k in sorted(range(len(wanted)), key=lambda k: not self.machines[k].is_switch):
             leaves = (leave for leave in self.machines[k].modes[wanted[k]].leaves if not leave.by_time)
             names = (wanted[k], *(leave.to for leave in leaves if leave.to))
             options = (with_modes(modes, {k: name}) for name in names)
             modes = next(filter(self.possible, options), modes)
-        return self._transfer.changed(loose, t, modes)
+        return self._transfer.to_modes(loose, t, modes)
 
-    def begun(self, t: float, x: Array) -> HybridState:
-        """The modes that go on where a motion starts at a time in s with states (n,), as in `started`."""
-        return self.run(t, t, self.started(t, x), None)[0]
+    def started(self, t: float, x: Array) -> HybridState:
+        """The modes that go on where a motion starts at a time in s with states (n,), as in `in_start_modes`."""
+        return self.run(t, t, self.in_start_modes(t, x), None)[0]
 
     def run(self, t: float, after: float, state: HybridState, met: int | None) -> Transition:
         """The modes that go on, and the changes that lead there.
@@ -118,7 +118,7 @@ class EventIteration:
         """The same instant with machines in modes in which they hold, and the changes to these."""
         modes, joinable = state.regime.modes, self._transfer.joinable(state.regime.modes, joins)
         changes = [Change(t, self.machines[k], modes[k], name) for k, name in joinable.items()]
-        return self._transfer.changed(state, after, with_modes(modes, joinable)), changes
+        return self._transfer.to_modes(state, after, with_modes(modes, joinable)), changes
 
     def _fewest(self, t: float, after: float, state: HybridState, met: int | None) -> Transition:
         """Of several guards that are met at one instant, rounding tells which of them ends the phase.
@@ -206,7 +206,7 @@ class EventIteration:
         number, leave, regime = ended.machine, ended.leave, state.regime
         machine = self.machines[number]
         before = regime.modes[number]
-        to = leave.to or anew(state, after, number)
+        to = leave.to or mode_anew(state, after, number)
         if machine.is_switch and (switched := self._commutation.switched(t, after, state, number, to)):
             return *switched, None, 0.0
         speed = self._impacts.meets(state, after, machine.modes[to], number)
@@ -250,7 +250,7 @@ class EventIteration:
         combinations = filter(self.possible, (with_modes(modes, option) for option in options))
         for combination in islice(combinations, tried, None):
             try:
-                new = self._impacts.jammed(after, state, self._transfer.changed(state, after, combination))
+                new = self._impacts.jammed(after, state, self._transfer.to_modes(state, after, combination))
             except NetworkError:  # what slips behind the gear lets another one jam
                 continue
             return new, differences(t, self.machines, modes, new.regime.modes)
@@ -270,7 +270,7 @@ class EventIteration:
             combination = with_modes(modes, {number: name})
             if name in (to, modes[number]) or not self.possible(combination):
                 continue
-            new = self._transfer.changed(state, t, combination)
+            new = self._transfer.to_modes(state, t, combination)
             if new.stored(t) == stored and not exceeded(new, t, new)[1]:
                 return new, name
         return None

@@ -142,7 +142,7 @@ class HybridModel(Model):
         first, p = self.equation_sets.first_equations(values)
         when = t if math.isfinite(t) else first.model.settled(p)
         event_iteration = EventIteration(self.equation_sets, values, (0.0, 1.0))
-        state = event_iteration.begun(when, initial_state(first.bound(p), initial or {}, when))
+        state = event_iteration.started(when, initial_state(first.bound(p), initial or {}, when))
         for _ in range(MOST_CHANGES):
             bound = state.regime.bound
             if not math.isfinite(t):
@@ -180,7 +180,7 @@ class HybridModel(Model):
         else:
             usual = 0.0 if at is None else first.model.settled(p)  # what rests has not begun to move
             time, x = operating_point(first.model, p, at, t, usual)
-        return time, event_iteration.begun(time, x)
+        return time, event_iteration.started(time, x)
 
     def words(self, state: HybridState) -> str:
         """The phase of a hybrid state, "gap open, brake locked"."""

@@ -181,7 +181,7 @@ class HybridRun:
         """The modes that go on from a start that has been read where some machines join something, and the changes."""
         after = self._after(read.regime)
         return self.event_iteration.run(
-            self.demand.span[0], after, self.event_iteration.started(after, read.x, joins), None
+            self.demand.span[0], after, self.event_iteration.in_start_modes(after, read.x, joins), None
         )
 
     def _beside_waves(self, regime: Regime, x: Array, start: Any) -> Array:

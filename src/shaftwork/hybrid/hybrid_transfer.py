@@ -77,7 +77,7 @@ class HybridTransfer:
                 joined[k] = name
         return joined
 
-    def taking(self, modes: ModeNames, t: float, stored: Mapping[str, float]) -> HybridState:
+    def with_stored(self, modes: ModeNames, t: float, stored: Mapping[str, float]) -> HybridState:
         """A state in the given modes that takes up what was stored, with the inputs of a time in s.
 
         Raises:
@@ -86,7 +86,7 @@ class HybridTransfer:
         new = self.regime(modes)
         return HybridState(new, new.equations.taking(t, stored, new.p))
 
-    def changed(self, state: HybridState, t: float, modes: ModeNames) -> HybridState:
+    def to_modes(self, state: HybridState, t: float, modes: ModeNames) -> HybridState:
         """The same instant in other modes: all that is stored goes over.
 
         Raises:
@@ -95,7 +95,7 @@ class HybridTransfer:
         new = self.regime(modes)
         if new.equations is state.regime.equations:
             return HybridState(new, state.x)
-        return self.taking(modes, t, state.stored(t))
+        return self.with_stored(modes, t, state.stored(t))
 
     def resumed(self, ending: Ending) -> HybridState:
         """The state at which another motion ended, in its modes.
@@ -108,7 +108,7 @@ class HybridTransfer:
         first, t, loose = self.first, ending.read, self.regime(self.first)
         ending.refuse_lacking(loose.stores.names)
         parameters = dict(zip(loose.model.parameters, loose.p.tolist(), strict=True))
-        apart = self.taking(first, t, ending)
+        apart = self.with_stored(first, t, ending)
         if ending.changed(parameters) - {machine.number for machine in self.machines}:
             refuse_beyond(apart, t)
         anew = [
@@ -118,10 +118,10 @@ class HybridTransfer:
         fresh = loose.equations.first_modes(t, apart.x, loose.p) if any(anew) else first
         triples = zip(anew, fresh, self.machines, strict=True)
         modes = tuple(name if begins else ending.modes[e.name] for begins, name, e in triples)
-        return self.taking(modes if self.possible(modes) else first, t, ending)
+        return self.with_stored(modes if self.possible(modes) else first, t, ending)
 
 
-def anew(state: HybridState, t: float, number: int) -> str:
+def mode_anew(state: HybridState, t: float, number: int) -> str:
     """The mode of a machine in which a motion would start, other than the one that ends."""
     regime, before = state.regime, state.regime.modes[number]
     for late in (0.0, regime.ahead(state.course(t)[2])):  # by rounding, what ends the mode may not be true yet

@@ -267,7 +267,7 @@ class Collisions:
         open_yet = [c for c in closed if c.number in massless and c.leave is None]
         pressed = [c for c in closed if c not in open_yet]
         new, apart = (
-            self._transfer.changed(after, t, with_modes(modes, {c.number: c.joined for c in some}))
+            self._transfer.to_modes(after, t, with_modes(modes, {c.number: c.joined for c in some}))
             for some in (closed, pressed)
         )
         if not open_yet or not new.differs(apart, t, least):
@@ -289,13 +289,13 @@ class Collisions:
 
         def compressed(start: ImpactStart, _: Sequence[ImpactStage]) -> Blow:
             modes = start.state.regime.modes
-            state = start.state if start.t == t else self._transfer.taking(modes, t, start.stored)
+            state = start.state if start.t == t else self._transfer.with_stored(modes, t, start.stored)
             mobility, opens = self._mobility(t, state, contacts)
             impulses = complementary(mobility.W, opens)
             if impulses is not None:
                 return _blow(state, mobility, impulses)
             closing = {c.number: c.joined for c, u in zip(contacts, opens, strict=True) if u < 0}
-            joined = self._transfer.changed(state, t, with_modes(modes, closing))
+            joined = self._transfer.to_modes(state, t, with_modes(modes, closing))
             return Blow(joined, joined.regime, np.zeros(len(contacts)))
 
         return self._impulses.stages(t, begins, compressed)
@@ -304,7 +304,7 @@ class Collisions:
         """Elements are joined at once, by what impulses it takes."""
 
         def joined(start: ImpactStart, _: Sequence[ImpactStage]) -> Blow:
-            after = self._transfer.changed(start.state, t, with_modes(start.state.regime.modes, joins))
+            after = self._transfer.to_modes(start.state, t, with_modes(start.state.regime.modes, joins))
             return Blow(after, after.regime)
 
         return self._impulses.stages(t, begins, joined)
@@ -355,7 +355,7 @@ class Collisions:
         """The state in some modes, but with all contacts open, and what rubs slipping."""
         apart = {k: sides[0][1] for k, sides in self._rubbing(modes).items()} | {c.number: c.apart for c in contacts}
         loose = with_modes(modes, apart)
-        return self._impulses.begins(self._transfer.taking(loose, t, state.stored(t)), t)
+        return self._impulses.begins(self._transfer.with_stored(loose, t, state.stored(t)), t)
 
     def _rubbing(self, modes: ModeNames) -> dict[int, GivesWay]:
         """Elements that hold by torques limited on both sides, with the modes to which these lead."""

@@ -43,7 +43,7 @@ class Impacts:
         if abs(speed) <= least or abs(speed) <= abs(speed - before):
             return 0.0
         try:
-            joined = self._transfer.changed(state, t, with_modes(regime.modes, {number: to.name}))
+            joined = self._transfer.to_modes(state, t, with_modes(regime.modes, {number: to.name}))
         except NetworkError:
             return speed
         # between dampers alone a speed is whatever their torques make it: joining them stops no inertia
@@ -112,7 +112,7 @@ class Impacts:
         before = state.regime.modes
         same = {k: before[k] for k in self.gears if state.across(k, t) * new.across(k, t) >= 0}
         modes = with_modes(new.regime.modes, same)
-        flies = self._transfer.changed(new, t, modes) if self._transfer.possible(modes) else new
+        flies = self._transfer.to_modes(new, t, modes) if self._transfer.possible(modes) else new
         step = flies.regime.ahead(flies.course(t)[2])
         later = flies.moved(t, step).across(number, t + step)
         pushed = math.copysign(1.0, speed) * (later - flies.across(number, t)) / step

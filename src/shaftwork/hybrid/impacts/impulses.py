@@ -117,11 +117,11 @@ class Impulses:
             for (name, value), gain in zip(start.stored.items(), self._gained(t, start, blow).values(), strict=True)
         }
         speeds = {k: v + share * (blow.after.across(k, t) - v) for k, v in start.speeds.items()}
-        return ImpactStart(self._transfer.taking(modes, t, stored), t, stored, {**speeds, number: 0.0})
+        return ImpactStart(self._transfer.with_stored(modes, t, stored), t, stored, {**speeds, number: 0.0})
 
     def _in_modes(self, t: float, start: ImpactStart, modes: ModeNames) -> ImpactStart:
         """The same start in other modes of gears; one that jams has stopped in it."""
-        new = ImpactStart(self._transfer.taking(modes, t, start.stored), t, start.stored, start.speeds)
+        new = ImpactStart(self._transfer.with_stored(modes, t, start.stored), t, start.stored, start.speeds)
         halted = {*self._stopped(new.state)} - {*self._stopped(start.state)}
         return self.begins(new.state, t) if any(start.speeds[k] for k in halted) else new
 

@@ -54,7 +54,7 @@ class ReactionEquations(ModeEquations):
         forms = [choice.form if law is None else None for law, choice in zip(laws, choices, strict=True)]
         super().__init__(model, machines, forms, None if self._entries is None else self._entries.rows)
         self.stores = HeldStores(model.form)
-        self._laws, self._held = laws, list[int]()
+        self._laws, self._holding_laws = laws, list[int]()
         joining = (machine.number for machine, law in zip(machines, laws, strict=True) if law is not None)
         self._joining = [self._places[number] for number in joining if number in self._places]
         self._joints: tuple[LinearPart, Joints] | None = None
@@ -67,7 +67,7 @@ class ReactionEquations(ModeEquations):
         other = copy(self)
         caches: dict[str, Any] = {name: BoundedCache(KEPT_RATES) for name in ("_guards_by_p", "_rates_by_p")}
         laws = [law for k in numbers if (law := self._laws[k]) is not None]
-        vars(other).update(_held=laws, _joints=None, _holds=None, **caches)
+        vars(other).update(_holding_laws=laws, _joints=None, _holds=None, **caches)
         return other
 
     def holds_by_numbers(self, number: int) -> bool:
@@ -108,7 +108,7 @@ class ReactionEquations(ModeEquations):
         """What holds, for parameters; the last is kept."""
         part = self.prepared(p).bound.part
         if self._joints is None or self._joints[0] is not part:
-            self._joints = part, Joints(self.model.form, part, self._held)
+            self._joints = part, Joints(self.model.form, part, self._holding_laws)
         return self._joints[1]
 
     def alike(self, modes: ModeNames) -> tuple[ModeEquations, ModeNames]:
