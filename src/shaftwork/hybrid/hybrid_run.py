@@ -100,6 +100,7 @@ class HybridRun:
         self.engine, self.why, self.steps = "", "", 0
         self.waves: WaveRun | None = None
         self._soon = [0] * len(CHATTER)
+        self._duration = demand.span[1] - demand.span[0]
 
     def march(self, initial: Mapping[str, float] | None) -> None:
         """Go through all phases from the start values, from one change of equations to the next."""
@@ -237,7 +238,7 @@ class HybridRun:
         """
         if not changes:
             return
-        passed = (t - self.changes[-1].time) / (self.demand.span[1] - self.demand.span[0]) if self.changes else 1.0
+        passed = (t - self.changes[-1].time) / self._duration if self.changes else 1.0
         self.changes += changes
         if passed >= SELDOM:
             self._soon = [0] * len(CHATTER)

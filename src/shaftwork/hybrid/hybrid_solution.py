@@ -305,10 +305,10 @@ def _events(changes: Iterable[Change]) -> Iterator[tuple[float, str, str, str]]:
         return machine.name, machine.modes[before].words, "rebound" if rebound else machine.modes[after].words
 
     at_once = (_without_detours([*one_time]) for _, one_time in groupby(changes, attrgetter("time")))
-    for time, *change in chain.from_iterable(at_once):
-        name, was, now = in_words(*change[:4])
+    for change in chain.from_iterable(at_once):
+        name, was, now = in_words(change.machine, change.before, change.after, change.rebound)
         if was != now:
-            yield time, name, was, now
+            yield change.time, name, was, now
 
 
 def _table(run: HybridRun) -> tuple[PhaseRow, ...]:

@@ -194,17 +194,19 @@ class InPlaceEvents:
         now, near, later = to.near(t, states, to.tick, to.moves, to.longest)
         bands = [0.0] * len(now)
         for guard, side, other in step.watched:
-            excess, band, earlier = side * now[guard], abs(near[guard] - now[guard]), before[guard]
-            if other and (where := side_of_limit(excess, max(earlier, band))) >= 0:
-                return guard if where > 0 else None
+            excess, band = side * now[guard], abs(near[guard] - now[guard])
+            # nearly all guards are far from their limits, and a call for each would show at every event
+            if other and (excess >= -band or excess >= -before[guard]):
+                return guard if side_of_limit(excess, max(band, before[guard])) > 0 else None
             bands[guard] = clear_of_limit(excess, band)
         return now, later, bands, y
 
     def _successor(self, regime: Regime, met: int) -> ModeChange | None:
         """Where a guard leads in the same equations."""
-        if met not in regime.successors:
-            regime.successors.setdefault(met, self._change_by(regime, met))
-        change: ModeChange | None = regime.successors[met]
+        try:
+            change: ModeChange | None = regime.successors[met]
+        except KeyError:
+            change = regime.successors.setdefault(met, self._change_by(regime, met))
         return change
 
     def _change_by(self, regime: Regime, met: int) -> ModeChange | None:
