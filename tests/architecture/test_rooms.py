@@ -36,7 +36,7 @@ NEEDS = {"reporting": ("latex", "drawing", "modelfiles")}
 JOINS = {
     "drawing": ("shaftwork.reporting",),
     "modelfiles": ("shaftwork.reporting",),
-    "hybrid": ("shaftwork.waves.phased_waves", "shaftwork.waves.hybrid_waves", "shaftwork.sweep.phased_ensemble"),
+    "hybrid": ("shaftwork.waves.hybrid_wave_model", "shaftwork.waves.hybrid_waves", "shaftwork.sweep.hybrid_ensemble"),
     "latex": ("shaftwork.lagrange.lagrange_print", "shaftwork.reduce.reduction_print", "shaftwork.reporting"),
 }
 """By feature, modules of other rooms that join these to it; they are loaded where both are at work."""

@@ -59,7 +59,7 @@ KINDS = st.lists(st.sampled_from(["friction", "load", "brake", "clutch"]), min_s
 def by_combinations(model: Any, t_end: float) -> sw.Solution:
     """The motion in equations of its own for each combination."""
     run = HybridRun(
-        model.phases,
+        model.equation_sets,
         {},
         Demand((0.0, t_end), 1e-10, None, np.linspace(0.0, t_end, 11), "auto", 10**6, None),
         by_combination=True,
@@ -195,7 +195,7 @@ def test_a_row_of_rigid_contacts_shares_one_set_of_equations(impacts: Any) -> No
     caught = int(np.count_nonzero(hits < 5.0))
     assert {float(sol[f"J{k}.omega"][-1]) for k in range(caught + 1)} == {float(sol["J0.omega"][-1])}
     assert sol["J0.omega"][-1] == pytest.approx(4.0 / (caught + 1), rel=1e-9)
-    assert len(model.phases._assemblies) == 1  # no combination has equations of its own
+    assert len(model.equation_sets._by_forms) == 1  # no combination has equations of its own
     lost = sum(sol.energy.lost_in[f"gap{k}"] for k in range(1, COUNT + 1))
     assert lost == pytest.approx(8.0 - 8.0 / (caught + 1), rel=1e-9)
 

@@ -282,11 +282,11 @@ def test_auto_goes_on_with_scipy_where_a_law_in_the_midst_of_contacts_has_no_tay
 
 
 def test_an_end_of_a_mode_that_the_series_have_hidden_is_told() -> None:
-    settling = EventIteration(model().phases, {}, (0.0, 10.0))
-    regime = settling.regime(("open", "forward", "released"))
-    size, bands = len(regime.assembly.model.states), [1e-12] * len(regime.sides)
-    passing = InPlaceEvents(settling, HybridState(regime, np.zeros(size), bands), 0.0, lambda _t, _made: None)
-    twist = regime.assembly.model.states.index("gap.phi")
+    event_iteration = EventIteration(model().equation_sets, {}, (0.0, 10.0))
+    regime = event_iteration.regime(("open", "forward", "released"))
+    size, bands = len(regime.equations.model.states), [1e-12] * len(regime.sides)
+    passing = InPlaceEvents(event_iteration, HybridState(regime, np.zeros(size), bands), 0.0, lambda _t, _made: None)
+    twist = regime.equations.model.states.index("gap.phi")
     within = np.ones(size)
     within[twist] = 0.0
     beyond = np.ones(size)
@@ -297,11 +297,11 @@ def test_an_end_of_a_mode_that_the_series_have_hidden_is_told() -> None:
 
 
 def test_the_rates_of_many_instants_are_those_of_each() -> None:
-    settling = EventIteration(model().phases, {}, (0.0, 10.0))
-    regime = settling.regime(("forward", "forward", "released"))
-    x = np.random.default_rng(0).normal(size=(5, len(regime.assembly.model.states)))
+    event_iteration = EventIteration(model().equation_sets, {}, (0.0, 10.0))
+    regime = event_iteration.regime(("forward", "forward", "released"))
+    x = np.random.default_rng(0).normal(size=(5, len(regime.equations.model.states)))
     moment = HybridState(regime, x[0], [0.0] * len(regime.sides))
-    problem = moment.problem((0.0, 10.0), regime.assembly.model.switching.timeline(regime.p, 0.0, 10.0))
+    problem = moment.problem((0.0, 10.0), regime.equations.model.switching.timeline(regime.p, 0.0, 10.0))
     times = np.linspace(0.1, 0.9, 5)
     assert problem.rates is not None
     each = [problem.rhs(t, state) for t, state in zip(times.tolist(), x, strict=True)]
@@ -310,11 +310,11 @@ def test_the_rates_of_many_instants_are_those_of_each() -> None:
 
 def test_a_wheel_slips_in_the_way_it_is_pulled_where_the_rounding_of_a_moment_is_not_known() -> None:
     net = wheel(sw.TorqueSource("pull", tau=3.0), sw.CoulombLoad("load", tau=2.0))
-    settling = EventIteration(net.compile().phases, {}, (0.0, 10.0))
-    regime = settling.regime(("stuck",))
+    event_iteration = EventIteration(net.compile().equation_sets, {}, (0.0, 10.0))
+    regime = event_iteration.regime(("stuck",))
     met = next(made.guard for made in regime.watched if made.leave.to == "forward")
-    moment = HybridState(regime, np.zeros(len(regime.assembly.model.states)))
-    moment, changes = settling.settle(0.0, 0.0, moment, met)
+    moment = HybridState(regime, np.zeros(len(regime.equations.model.states)))
+    moment, changes = event_iteration.run(0.0, 0.0, moment, met)
     assert [(change.before, change.after) for change in changes] == [("stuck", "forward")]
     assert moment.regime.modes == ("forward",)
 
@@ -384,11 +384,11 @@ def test_modes_that_contradict_each_other_keep_no_frames_of_those_who_asked() ->
     net = sw.Network("belt")
     net.add(sw.SpeedSource("belt", omega=1.0), "wheel")
     net.add(sw.DryFriction("shoe", tau_c=1.0), "wheel")
-    phases = net.compile().phases
+    equation_sets = net.compile().equation_sets
     depths = []
     for _ in range(3):
         with pytest.raises(sw.NetworkError) as refused:
-            phases.assembly(("stuck",))
+            equation_sets.of(("stuck",))
         depths.append(len(list(traceback.walk_tb(refused.value.__traceback__))))
     assert depths[1] == depths[2]
 

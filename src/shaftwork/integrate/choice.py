@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from typing import TypeVar
 
 from shaftwork.core.errors import MissingExtraError, ParameterError, SimulationError
 from shaftwork.integrate.engines import ADAMS, ENGINES, INNER
-from shaftwork.integrate.problem import Engine, Problem, SeriesError, StickingError, Trajectory
+from shaftwork.integrate.problem import Engine, Problem, SeriesError, StickingError, Trajectory, changed
+
+Run = TypeVar("Run")
+"""What a run with an engine gives."""
 
 # Why another engine goes on where heyoka stopped.
 NO_SERIES = "There is no Taylor series of the whole motion: {}. So {} is taken."
@@ -99,32 +104,43 @@ def solve(
     if name != "heyoka" or not (fallback or engine == "auto"):
         trajectory = _guarded(problem, load(name)(problem), name)
         return trajectory, name, f"{why or reason} {trajectory.remark}".rstrip()
+
+    def run(other: str, steps: int, because: str) -> tuple[Trajectory, str, str]:
+        return _guarded(problem, load(other)(changed(problem, max_steps=steps)), other), other, because
+
     try:
-        return _guarded(problem, load(name)(problem), name), name, why or reason
+        return run(name, problem.max_steps, why or reason)
     except SeriesError as error:
-        if isinstance(error, StickingError) and error.driven_back:
-            raise
         failed = error
-        *tried, (last, _) = without_series(problem.max_steps)
-    for other, steps in tried:
-        with suppress(SimulationError):
-            trajectory = _guarded(problem, load(other)(replace(problem, max_steps=steps)), other)
-            return trajectory, other, no_series(failed, other)
-    if tried and isinstance(failed, StickingError):
+    return without_series(run, failed, problem.max_steps)
+
+
+def without_series(run: Callable[[str, int, str], Run], failed: SeriesError, most: int) -> Run:
+    """A run with other engines, tried one after another, where heyoka cannot go on.
+
+    Args:
+        run: makes it with an engine by name, so many steps at most, for a reason.
+        failed: why heyoka cannot.
+        most: steps.
+
+    Raises:
+        SimulationError: no engine goes on; of a motion that sticks where a law jumps heyoka says why.
+    """
+    if is_driven_back(failed):
         raise failed
-    return _guarded(problem, load(last)(problem), last), last, no_series(failed, last)
+    implicit = ENGINES["sundials"].installed  # looked at only now: it takes a while to tell
+    ladder = [("scipy", min(most, LONG_FOR_SCIPY)), ("sundials", most)] if implicit else []
+    for name, steps in ladder:
+        with suppress(SimulationError):
+            return run(name, steps, NO_SERIES.format(failed.obstacle, IN_WORDS[name]))
+    if implicit and isinstance(failed, StickingError):
+        raise failed
+    return run("scipy", most, NO_SERIES.format(failed.obstacle, IN_WORDS["scipy"]))
 
 
-def without_series(most: int) -> list[tuple[str, int]]:
-    """The engines that are tried one after another where heyoka cannot go on: name and most steps."""
-    if not ENGINES["sundials"].installed:
-        return [("scipy", most)]
-    return [("scipy", min(most, LONG_FOR_SCIPY)), ("sundials", most), ("scipy", most)]
-
-
-def no_series(failed: SeriesError, name: str) -> str:
-    """Why another engine is taken where heyoka cannot go on."""
-    return NO_SERIES.format(failed.obstacle, IN_WORDS[name])
+def is_driven_back(failed: SimulationError) -> bool:
+    """Whether a motion sticks where a law jumps, driven back there from both sides: no engine goes on."""
+    return isinstance(failed, StickingError) and failed.driven_back
 
 
 def _guarded(problem: Problem, trajectory: Trajectory, name: str) -> Trajectory:

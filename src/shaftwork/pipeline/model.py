@@ -43,7 +43,7 @@ from shaftwork.pipeline.arguments import (
     step_limit,
     time_span,
 )
-from shaftwork.pipeline.implicit import IMPLICIT, PRESCRIBED, at_rest, solve_loops, start_of_loops
+from shaftwork.pipeline.implicit import IMPLICIT, PRESCRIBED, solve_loops, start_of_loops, without_states
 from shaftwork.pipeline.motion_start import (
     Ending,
     Repetition,
@@ -292,7 +292,7 @@ class Model(EngineModel):
         """The run, the engine that made it, and why that one."""
         name, why = self._engine(prepared, problem, engine)
         if not self.states:
-            return at_rest(problem, self.degree), name, why
+            return without_states(problem, self.degree), name, why
         if self.form.loop_laws:
             start = start_of_loops(prepared.bound, problem)
             if name == "sundials":

@@ -362,12 +362,12 @@ def _kind_of_model(form: StateForm, netlist: Netlist) -> type[Model]:
     """The kind of model that a network needs; that of one phase, in which modes are chosen, has no phases."""
     if any(part.modes for part in form.graph.parts) and not any(item.choices for item in netlist.placed):
         if form.waves:
-            from shaftwork.waves.phased_waves import PhasedWaveModel
+            from shaftwork.waves.hybrid_wave_model import HybridWaveModel
 
-            return PhasedWaveModel
-        from shaftwork.hybrid.phased_model import PhasedModel
+            return HybridWaveModel
+        from shaftwork.hybrid.hybrid_model import HybridModel
 
-        return PhasedModel
+        return HybridModel
     if form.waves:
         from shaftwork.waves.wave_model import WaveModel
 

@@ -235,7 +235,8 @@ class MotionSlopes:
 
     def _integrate(self) -> None:
         motion, count = self._motion, len(self._symbols)
-        carrying = None if motion.phases is None else SensitivityTransfer(motion.phases, self.equations, self.sizes)
+        sets = motion.equation_sets
+        carrying = None if sets is None else SensitivityTransfer(sets, self.equations, self.sizes)
         length, fixed = self.legs[-1].end - self.legs[0].start, np.zeros(count)
         jumps = JumpConditions(self.equations, carrying, self.sizes, self._swiftest.__getitem__, length)
         slopes = np.zeros((self._swiftest[self.legs[0].model].size, count))

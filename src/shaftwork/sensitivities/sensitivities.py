@@ -31,7 +31,7 @@ from shaftwork.sensitivities.motion_slopes import MotionSlopes
 from shaftwork.sensitivities.sensitivity_tables import FrequencySensitivities, MotionSensitivities
 
 if TYPE_CHECKING:
-    from shaftwork.hybrid.phased_model import PhasedModel
+    from shaftwork.hybrid.hybrid_model import HybridModel
 
 NO_DERIVATIVE = {
     "decisive": "decides which equations hold, so nothing is smooth in it. Give it a value that is not exactly zero, "
@@ -346,5 +346,5 @@ def _start(
     """The states by name, and where they start, in the equations in which nothing is joined."""
     if not model.phased:
         return tuple(model.states), model.start(model.prepare(model.vector(values)), initial, span)[0]
-    assembly, p = cast("PhasedModel", model).phases.first_equations(values)
-    return tuple(assembly.model.states), assembly.model.start(assembly.prepared(p), initial, span)[0]
+    first, p = cast("HybridModel", model).equation_sets.first_equations(values)
+    return tuple(first.model.states), first.model.start(first.prepared(p), initial, span)[0]

@@ -228,9 +228,9 @@ class Worker:
 def _kind_of(model: Model) -> type[Ensemble]:
     """What runs variants of a network side by side."""
     if model.phased:
-        from shaftwork.sweep.phased_ensemble import PhasedEnsemble
+        from shaftwork.sweep.hybrid_ensemble import HybridEnsemble
 
-        return PhasedEnsemble
+        return HybridEnsemble
     from shaftwork.sweep.ensemble import Ensemble
 
     return Ensemble

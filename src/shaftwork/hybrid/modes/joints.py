@@ -85,8 +85,8 @@ def held_places(form: StateForm, link: int) -> set[int]:
 def groups(form: StateForm, laws: Iterable[int], others: Iterable[Collection[int]]) -> list[set[int]] | None:
     """The states that laws connect, or None where rows are not the place for what holds.
 
-    They are where no element rests because others hold both of its ends: as a rule, each holds inertias of its own. Who
-    carries would be another question, which an assembly of its own answers.
+    They are where no machine rests because others hold both of its ends: as a rule, each holds inertias of its own. Who
+    carries would be another question, which an equations of its own answers.
 
     Args:
         form: of the equations in which nothing holds.

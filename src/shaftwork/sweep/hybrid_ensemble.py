@@ -10,13 +10,20 @@ import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import CompileError
-from shaftwork.hybrid.hybrid_state import AHEAD, AHEAD_OF_RUN, CLEAR, EPS, FEW, GOLDEN, NOTHING, ROUNDINGS
+from shaftwork.hybrid.consistency import (
+    AHEAD_OF_RUN,
+    ROUNDINGS,
+    clear_of_limit,
+    drift,
+    moved_by_rounding,
+    rounding_moves,
+    side_of_limit,
+)
+from shaftwork.hybrid.equation_sets import EquationSets
+from shaftwork.hybrid.hybrid_model import HybridModel
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import with_modes
-from shaftwork.hybrid.phased_model import PhasedModel
-from shaftwork.hybrid.phases import Phases
-from shaftwork.hybrid.starts import conditional
-from shaftwork.pipeline.arguments import NOMINAL
+from shaftwork.hybrid.modes.starts import conditional
 from shaftwork.sweep.ensemble import Ensemble
 from shaftwork.sweep.ensemble_equations import EnsembleCode, EnsembleEquations, ModeNames, PhaseEntry, VariantGroup
 from shaftwork.sweep.lane_steps import Mask
@@ -26,47 +33,47 @@ Course = tuple[Array, Array, Array, Array]
 """Times (k,), states (n, k), their rates, and guards (guards, k)."""
 
 
-class PhasedEnsemble(Ensemble):
+class HybridEnsemble(Ensemble):
     """Measures of many variants of a network whose parts change their mode; see `Ensemble`."""
 
     @property
-    def _phases(self) -> Phases:
-        return cast("PhasedModel", self.model).phases
+    def _equation_sets(self) -> EquationSets:
+        return cast("HybridModel", self.model).equation_sets
 
     def _first_modes(self, values: Mapping[str, float]) -> ModeNames:
-        assembly, p = self._phases.first_equations(values)
-        return assembly.first_modes(self.span[0], np.zeros(len(assembly.model.states)), p)
+        equations, p = self._equation_sets.first_equations(values)
+        return equations.first_modes(self.span[0], np.zeros(len(equations.model.states)), p)
 
     def _equations_in(self, modes: ModeNames) -> EnsembleEquations:
-        assembly = self._phases.assembly(modes)
-        if assembly.clocks:
+        equations = self._equation_sets.of(modes)
+        if equations.clocks:
             raise CompileError(CLOCKED)
-        code = self.code_of(assembly.model, assembly.program, assembly.stores)
-        base = assembly.vector(self.first, self._phases.numbers(modes))
-        return GuardedEquations(code, assembly, modes, base, self.names, self.span)
+        code = self.code_of(equations.model, equations.program, equations.stores)
+        base = equations.vector(self.first, self._equation_sets.numbers(modes))
+        return GuardedEquations(code, equations, modes, base, self.names, self.span)
 
     @cached_property
     def decisive(self) -> bool:
         """Whether a parameter that varies decides in which mode a motion starts."""
         symbols = {
-            f"{element.part.name}.{symbol.name}"
-            for element in self._phases.elements
-            for symbol in conditional(element.modes)
+            f"{machine.part.name}.{symbol.name}"
+            for machine in self._equation_sets.machines
+            for symbol in conditional(machine.modes)
         }
         return not symbols.isdisjoint(self.names)
 
     def after(self, group: VariantGroup, guard: int, p: Array) -> list[tuple[ModeNames, Mask]]:
         """The modes to which a guard leads by itself, and the lanes (k,) that go there."""
-        assembly = self._phases.assembly(group.modes)
-        met = [active for active in assembly.watched(group.modes) if active.guard == guard]
+        equations = self._equation_sets.of(group.modes)
+        met = [active for active in equations.watched(group.modes) if active.guard == guard]
         if len(met) != 1 or met[0].leave.rebound is not None:
             return []
-        ended, number, count = met[0], met[0].element, group.lanes.size
+        ended, number, count = met[0], met[0].machine, group.lanes.size
         names = [ended.leave.to] * count
         if not ended.leave.to:
-            before, parameters = group.modes[number], p[: len(assembly.model.parameters)]
+            before, parameters = group.modes[number], p[: len(equations.model.parameters)]
             starts = zip(group.t.tolist(), group.x.T, parameters.T, strict=True)
-            names = [assembly.start_of(number, before, *start) for start in starts]
+            names = [equations.start_of(number, before, *start) for start in starts]
         targets = dict.fromkeys(names)
         return [(with_modes(group.modes, {number: to}), np.array([name == to for name in names])) for to in targets]
 
@@ -76,7 +83,7 @@ class GuardedEquations(EnsembleEquations):
 
     Args:
         code: its programs.
-        assembly: the equations with their guards.
+        equations: the equations with their guards.
         modes: the combination.
         base: the parameter vector of a variant, of which sizes are taken.
         names: of the parameters that vary.
@@ -86,16 +93,17 @@ class GuardedEquations(EnsembleEquations):
     def __init__(
         self,
         code: EnsembleCode,
-        assembly: ModeEquations,
+        equations: ModeEquations,
         modes: ModeNames,
         base: Array,
         names: Sequence[str],
         span: tuple[float, float],
     ) -> None:
-        super().__init__(code, base, assembly.sizes(base), names)
-        self.sides = assembly.sides(modes)
+        super().__init__(code, base, equations.sizes(base), names)
+        self.sides = equations.sides(modes)
         self._tick = ROUNDINGS * float(np.spacing(max(map(abs, span))))
-        self._ahead = AHEAD_OF_RUN * (span[1] - span[0])
+        self._longest = AHEAD_OF_RUN * (span[1] - span[0])
+        self._moves = np.array(rounding_moves(self.sizes.tolist())).T[:, :, None]
 
     def entered(self, t: Array, x: Array, p: Array) -> PhaseEntry:
         """Whether every guard is on its own side, or on its limit and about to be, as `EventIteration` would find.
@@ -108,34 +116,24 @@ class GuardedEquations(EnsembleEquations):
         if not len(self.sides):
             return super().entered(t, x, p)
         rates, now = self.code.motion(t, x, p)
-        moved = self._rounded(x, rates)
+        moved = moved_by_rounding(x, rates, self._moves, self._tick)
         near_rates, near = self.code.motion(t + self._tick, moved, p)
         side, bands, step = self.sides[:, None], np.abs(near - now), self._step(rates)
-        value = side * now
-        falls, decided = np.zeros_like(value, dtype=bool), np.zeros_like(value, dtype=bool)
+        excess, turns = side * now, np.zeros(now.shape, dtype=np.intp)
         here, beside = (t, x, rates, now), (t + self._tick, moved, near_rates, near)
         for _ in range(2):  # where nothing moves yet, its acceleration tells
             here, beside = self._later(step, here, p), self._later(step, beside, p)
-            gain, other = side * (here[3] - now), side * (beside[3] - near)
-            sure = np.abs(gain) > np.maximum(np.abs(gain - other), FEW * bands / ROUNDINGS)
-            falls |= ~decided & sure & (gain < 0)
-            decided |= sure
-        good = (value < -bands) | ((value <= bands) & falls)
-        clear = np.where(2 * value > -CLEAR * bands, np.maximum(value, 0.0) + CLEAR * bands, bands)
-        return PhaseEntry(np.all(good[self.watched], axis=0), np.maximum(clear, NOTHING))
-
-    def _rounded(self, x: Array, rates: Array) -> Array:
-        """The states so far away as rounding may move them, and the time by a tick; see `Regime.moves`."""
-        signs = np.array([(-1.0) ** k for k in range(len(x))])[:, None]
-        part = signs * np.array([(0.5 + k * GOLDEN % 1) * ROUNDINGS * EPS for k in range(len(x))])[:, None]
-        least = part * self.sizes[:, None] / NOMINAL
-        return np.asarray(x + part * np.abs(x) + least + signs * self._tick * np.abs(rates))
+            drifts = drift(side * (here[3] - now), side * (beside[3] - near), bands)
+            turns = np.where(turns == 0, drifts, turns)
+        where = side_of_limit(excess, bands)
+        good = (where < 0) | ((where == 0) & (turns < 0))
+        return PhaseEntry(np.all(good[self.watched], axis=0), clear_of_limit(excess, bands))
 
     def _step(self, rates: Array) -> Array:
-        """(k,) how far in s the further course is looked at."""
+        """(k,) how far in s the further course is looked at; see `Regime.ahead`."""
         with np.errstate(divide="ignore"):
-            steps = (AHEAD * self.sizes[:, None] / np.abs(rates)).min(axis=0)
-        return np.asarray(np.minimum(self._ahead, steps))
+            steps = (self._moves[3] / np.abs(rates)).min(axis=0)
+        return np.asarray(np.minimum(self._longest, steps))
 
     def _later(self, step: Array, course: Course, p: Array) -> Course:
         """A step further along a straight line."""

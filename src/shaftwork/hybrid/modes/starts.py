@@ -26,16 +26,16 @@ from shaftwork.hybrid.modes.mode_machines import ModeMachine, ModeNames
 from shaftwork.network.graph import GraphPart
 
 SPEEDS = 256
-"""Speeds across elements that are kept with values of the parameters."""
+"""Speeds across machines that are kept with values of the parameters."""
 
 
-class ElementReadings:
-    """What elements show at one instant: the speed across each, its twist, and what its start conditions read.
+class MachineReadings:
+    """What machines show at one instant: the speed across each, its twist, and what its start conditions read.
 
     All of it follows from what guards read at that instant.
 
     Args:
-        elements: of the network.
+        machines: of the network.
         parts: by name.
         readings: of the equations.
         parameters: symbols of the parameter vector.
@@ -43,30 +43,30 @@ class ElementReadings:
 
     def __init__(
         self,
-        elements: Sequence[ModeMachine],
+        machines: Sequence[ModeMachine],
         parts: Mapping[str, GraphPart],
         readings: Observables,
         parameters: tuple[Symbol, ...],
     ) -> None:
-        self._elements, self._parts, self._readings, self._parameters = elements, parts, readings, parameters
-        self._symbols = tuple(conditional(element.modes) for element in elements)
-        # of each element the place where what it shows begins
+        self._machines, self._parts, self._readings, self._parameters = machines, parts, readings, parameters
+        self._symbols = tuple(conditional(machine.modes) for machine in machines)
+        # of each machine the place where what it shows begins
         self._firsts = tuple(accumulate((2 + len(symbols) for symbols in self._symbols), initial=0))
         self._speeds: dict[int, Callable[..., Any]] = {}
         self._bound = BoundedCache[tuple[int, bytes], Callable[..., Any]](SPEEDS)
 
     def first_modes(self, t: float, read: Sequence[float], p: Array) -> ModeNames:
-        """The mode of each element in which a motion starts, in the equations in which nothing is joined by a mode."""
+        """The mode of each machine in which a motion starts, in the equations in which nothing is joined by a mode."""
         shown = self._at(t, read, p)
-        elements = enumerate(self._elements)
-        return tuple(self._start(k, "", t, shown) or element.first for k, element in elements)
+        machines = enumerate(self._machines)
+        return tuple(self._start(k, "", t, shown) or machine.first for k, machine in machines)
 
     def start_of(self, number: int, besides: str, t: float, read: Sequence[float], p: Array) -> str:
-        """The mode of an element in which a motion would start, besides one; empty where it would start in none."""
+        """The mode of a machine in which a motion would start, besides one; empty where it would start in none."""
         return self._start(number, besides, t, self._at(t, read, p))
 
     def across(self, numbers: Sequence[int], t: float, read: Sequence[float], p: Array) -> list[float]:
-        """The speeds across elements, which are asked for at every impact: in plain floats, and without the others."""
+        """The speeds across machines, which are asked for at every impact: in plain floats, and without the others."""
         return [float(self._speed(number, p)(t, read)[0]) for number in numbers]
 
     def _speed(self, number: int, p: Array) -> Callable[..., Any]:
@@ -79,33 +79,33 @@ class ElementReadings:
         return self.function(t, *read, *p.tolist())  # type: ignore[no-any-return]
 
     def _start(self, number: int, besides: str, t: float, shown: Sequence[Any]) -> str:
-        modes = self._elements[number].modes
+        modes = self._machines[number].modes
         first, symbols = self._firsts[number], self._symbols[number]
         holds = starts_of(modes, symbols)(t, *shown[first : first + 2 + len(symbols)])
         if holds is None:
-            raise no_value(t, in_words(self._elements[number].part, Tuple(*(mode.starts for mode in modes.options))))
+            raise no_value(t, in_words(self._machines[number].part, Tuple(*(mode.starts for mode in modes.options))))
         pairs = zip(modes.options, holds, strict=True)
         return next((mode.name for mode, is_true in pairs if is_true and mode.name != besides), "")
 
     @cached_property
     def function(self) -> Callable[..., Any]:
-        """Of each element the speed across it, its twist and the parameters in its conditions, one after another."""
+        """Of each machine the speed across it, its twist and the parameters in its conditions, one after another."""
         shown = list[Expr]()
-        for number, element in enumerate(self._elements):
-            reads = any(mode.starts.has(INTEGRAL) for mode in element.modes.options)
+        for number, machine in enumerate(self._machines):
+            reads = any(mode.starts.has(INTEGRAL) for mode in machine.modes.options)
             twist = self._expression(number, INTEGRAL) if reads else Integer(0)
             others = (self._expression(number, symbol) for symbol in self._symbols[number])
             shown += [self._expression(number, ACROSS), twist, *others]
         return vectorised_list((TIME, *self._readings.symbols, *self._parameters), shown)
 
     def _expression(self, number: int, of_part: Expr) -> Expr:
-        element = self._elements[number]
-        return self._readings.guard(self._parts[element.part.name], element.modes, of_part)
+        machine = self._machines[number]
+        return self._readings.guard(self._parts[machine.part.name], machine.modes, of_part)
 
 
 @lru_cache(maxsize=256)
 def conditional(modes: Modes) -> tuple[Symbol, ...]:
-    """The parameters in the conditions under which a motion starts in the modes of an element."""
+    """The parameters in the conditions under which a motion starts in the modes of a machine."""
     symbols = set[Symbol]().union(*(mode.starts.free_symbols for mode in modes.options))
     return tuple(sorted(symbols - {TIME, ACROSS, INTEGRAL}, key=str))
 
@@ -134,14 +134,14 @@ def starts_of(modes: Modes, symbols: tuple[Symbol, ...]) -> Callable[..., list[f
 def begins_anew(
     part: str, modes: Modes, mode: str | None, t: float, before: Mapping[str, float], now: Mapping[str, float]
 ) -> bool:
-    """Whether an element cannot go on in the mode in which another motion ended.
+    """Whether a machine cannot go on in the mode in which another motion ended.
 
     Limits and start conditions say in which mode it starts: where their parameters are others it begins anew, unless
     they stand beside the time alone and tell the same at this time, as a time to switch off that is still to come.
 
     Args:
         part: its name.
-        modes: of the element.
+        modes: of the machine.
         mode: in which the motion ended; None where it had none.
         t: the time, s.
         before: the parameters of that motion, "part.parameter" to value; zeros may be left out.
@@ -199,7 +199,7 @@ def warn_of_what_may_have_begun(name: str, modes: Modes, mode: str, t_start: flo
 
     Args:
         name: of the part.
-        modes: of its element.
+        modes: of its machine.
         mode: in which the motion begins.
         t_start: start of the motion, s.
     """

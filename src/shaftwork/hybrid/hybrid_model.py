@@ -20,12 +20,12 @@ from shaftwork.core.notices import warn
 from shaftwork.core.parameters import in_si
 from shaftwork.equations.records import NamedPhase
 from shaftwork.formulation.form import StateForm
+from shaftwork.hybrid.equation_sets import EquationSets
 from shaftwork.hybrid.event_iteration import EventIteration
 from shaftwork.hybrid.hybrid_run import HybridRun
 from shaftwork.hybrid.hybrid_solution import solution
 from shaftwork.hybrid.hybrid_state import HybridState, passes_limit
 from shaftwork.hybrid.named_phases import known_modes, modes_in, whole_name, words_of
-from shaftwork.hybrid.phases import Phases
 from shaftwork.network.netlist import listed
 from shaftwork.pipeline.arguments import Demand, Given, Point, Time
 from shaftwork.pipeline.model import Model
@@ -65,7 +65,7 @@ class PhaseModel(CompiledModel):
 def _of_a_phase(what: str) -> Any:
     """What one phase has and a whole network has not."""
 
-    def refuse(self: PhasedModel, *_args: Any, **_options: Any) -> NoReturn:
+    def refuse(self: HybridModel, *_args: Any, **_options: Any) -> NoReturn:
         """There is one for each phase.
 
         Raises:
@@ -80,7 +80,7 @@ def _of_a_phase(what: str) -> Any:
     return refuse
 
 
-class PhasedModel(Model):
+class HybridModel(Model):
     """A network with parts that change their mode, ready to be simulated again and again.
 
     Each phase has equations of its own, see `phase`.
@@ -91,7 +91,7 @@ class PhasedModel(Model):
     @cached_property
     def states(self) -> tuple[str, ...]:
         """All that is stored in any phase, as in a solution; which of it are states depends on the phase."""
-        return self.phases.assembly(self.phases.first).stores.names
+        return self.equation_sets.of(self.equation_sets.first).stores.names
 
     @cached_property
     def _phase_models(self) -> dict[str, PhaseModel]:
@@ -102,7 +102,7 @@ class PhasedModel(Model):
         graph, words = self.form.graph, words_of(name)
         whole, modes = whole_name(graph, words), tuple(mode.name for mode in modes_in(graph, words))
         if whole not in self._phase_models:
-            form, numbers = self.phases.assembly(modes).model.form, self.phases.numbers(modes)
+            form, numbers = self.equation_sets.of(modes).model.form, self.equation_sets.numbers(modes)
             self._phase_models[whole] = PhaseModel(form, whole, numbers)
         return self._phase_models[whole]
 
@@ -110,18 +110,18 @@ class PhasedModel(Model):
     code = property(_of_a_phase("code"))
 
     @cached_property
-    def phases(self) -> Phases:
+    def equation_sets(self) -> EquationSets:
         """The equations of every combination of modes that a motion has come to."""
-        return Phases(self, self._rebuild)
+        return EquationSets(self, self._rebuild)
 
     def _motion(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
-        first, p = self.phases.first_equations(values)
+        first, p = self.equation_sets.first_equations(values)
         return in_its_size(
             first.model.form, first.prepared(p), demand, lambda sized: self._run_through(values, initial, sized)
         )
 
     def _run_through(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
-        run = HybridRun(self.phases, values, demand)
+        run = HybridRun(self.equation_sets, values, demand)
         run.march(initial)
         return solution(run, self.name)
 
@@ -132,47 +132,47 @@ class PhasedModel(Model):
             SimulationError: no modes go together there.
         """
         demand = Demand((0.0, 1.0), 1e-8, None, None, "auto", 1, None)
-        return self.words(HybridRun(self.phases, {}, demand).begin(None))
+        return self.words(HybridRun(self.equation_sets, {}, demand).begin(None))
 
     def _choice(self, demand: Demand) -> tuple[str, str]:
-        return HybridRun(self.phases, {}, demand).choose()
+        return HybridRun(self.equation_sets, {}, demand).choose()
 
     def _steady(self, values: Mapping[str, float], t: float, initial: Given) -> SteadyState:
         """Steady states of one set of equations after another, until no mode changes there."""
-        first, p = self.phases.first_equations(values)
+        first, p = self.equation_sets.first_equations(values)
         when = t if math.isfinite(t) else first.model.settled(p)
-        settling = EventIteration(self.phases, values, (0.0, 1.0))
-        moment = settling.begun(when, initial_state(first.bound(p), initial or {}, when))
+        event_iteration = EventIteration(self.equation_sets, values, (0.0, 1.0))
+        state = event_iteration.started(when, initial_state(first.bound(p), initial or {}, when))
         for _ in range(MOST_CHANGES):
-            bound = moment.regime.bound
+            bound = state.regime.bound
             if not math.isfinite(t):
-                refuse_moving(bound, when, moment.regime.model.switching)
-            ends = partial(_ends, moment, when)
-            x = steady_state(bound, moment.x, when, ends=ends) if moment.x.size else moment.x
+                refuse_moving(bound, when, state.regime.model.switching)
+            ends = partial(_ends, state, when)
+            x = steady_state(bound, state.x, when, ends=ends) if state.x.size else state.x
             beyond = ends(x)
-            moment, changes = settling.settle(when, when, moment._replace(x=x), None)
+            state, changes = event_iteration.run(when, when, state._replace(x=x), None)
             if not (changes or beyond):
                 if not math.isfinite(t):
-                    warn_of_earlier_levels(bound, moment.x, when, moment.regime.model.switching)
-                warn_of_held_torques(moment, when)
-                return SteadyState(moment.stored(when), when)
+                    warn_of_earlier_levels(bound, state.x, when, state.regime.model.switching)
+                warn_of_held_torques(state, when)
+                return SteadyState(state.stored(when), when)
         raise SimulationError(
             f"No steady operation was found: after {MOST_CHANGES} changes of its modes '{self.name}' still goes on, "
-            f"with {self.words(moment)}. {another_start(self.form)}"
+            f"with {self.words(state)}. {another_start(self.form)}"
         )
 
     def point(self, values: Mapping[str, float], at: Point, t: Time) -> OperatingPoint:
         """The equations of the phase that goes on at a point, and where it is; see `Model.point`."""
-        time, moment = self.moment_at(values, at, t)
-        regime = moment.regime
-        return OperatingPoint(regime.assembly.model, regime.p, time, moment.x, self.words(moment))
+        time, state = self.hybrid_state_at(values, at, t)
+        regime = state.regime
+        return OperatingPoint(regime.equations.model, regime.p, time, state.x, self.words(state))
 
-    def moment_at(self, values: Mapping[str, float], at: Point, t: Time) -> tuple[float, HybridState]:
+    def hybrid_state_at(self, values: Mapping[str, float], at: Point, t: Time) -> tuple[float, HybridState]:
         """Time in s at a point, and the modes that go on there with their states; see `point`."""
         from shaftwork.frequency.analysis import moment_of, operating_point
 
-        first, p = self.phases.first_equations(values)
-        settling = EventIteration(self.phases, values, (0.0, 1.0))
+        first, p = self.equation_sets.first_equations(values)
+        event_iteration = EventIteration(self.equation_sets, values, (0.0, 1.0))
         if isinstance(at, Solution):
             time, stored = moment_of(at, self.states)
             time = time if t is None else in_si("t", t, "s")
@@ -180,37 +180,37 @@ class PhasedModel(Model):
         else:
             usual = 0.0 if at is None else first.model.settled(p)  # what rests has not begun to move
             time, x = operating_point(first.model, p, at, t, usual)
-        return time, settling.begun(time, x)
+        return time, event_iteration.started(time, x)
 
-    def words(self, moment: HybridState) -> str:
-        """The phase of a moment, "gap open, brake locked"."""
-        pairs = zip(self.phases.elements, moment.regime.modes, strict=True)
-        return ", ".join(f"{element.name} {element.modes[name].words}" for element, name in pairs)
+    def words(self, state: HybridState) -> str:
+        """The phase of a hybrid state, "gap open, brake locked"."""
+        pairs = zip(self.equation_sets.machines, state.regime.modes, strict=True)
+        return ", ".join(f"{machine.name} {machine.modes[name].words}" for machine, name in pairs)
 
     def start_equations(self, values: Mapping[str, float]) -> BoundArrays:
         """The equations of the first phase, of which start values tell the states."""
-        first, p = self.phases.first_equations(values)
+        first, p = self.equation_sets.first_equations(values)
         return first.bound(p)
 
 
-def _ends(moment: HybridState, t: float, x: Array) -> bool:
-    return passes_limit(moment._replace(x=x), t)
+def _ends(state: HybridState, t: float, x: Array) -> bool:
+    return passes_limit(state._replace(x=x), t)
 
 
-def warn_of_held_torques(moment: HybridState, when: float) -> None:
+def warn_of_held_torques(state: HybridState, when: float) -> None:
     """Warn where what sticks can hold other torques as well: a spring between two of them, or from one to the frame.
 
     The states are disturbed, and of that is read what is left for ever: it tells equilibria side by side.
 
     Args:
-        moment: the steady state.
+        state: the steady state.
         when: time at which laws are read, s.
     """
-    regime, x = moment.regime, moment.x
+    regime, x = state.regime, state.x
     holding = [
-        (regime.elements[active.element].name, active.guard)
+        (regime.machines[active.machine].name, active.guard)
         for active in regime.watched
-        if active.leave.by_torque and len(regime.mode(active.element).gives_way) > 1
+        if active.leave.by_torque and len(regime.mode(active.machine).gives_way) > 1
     ]
     if not (holding and x.size):
         return
