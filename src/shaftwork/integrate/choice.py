@@ -129,12 +129,16 @@ def no_series(failed: SeriesError, name: str) -> str:
 
 def _guarded(problem: Problem, trajectory: Trajectory, name: str) -> Trajectory:
     """The run, with what makes it worth less than it should be."""
-    from shaftwork.integrate.linear.rounding_errors import spoiled
-    from shaftwork.integrate.linear.verification import objection
+    if not trajectory.t.size or (problem.observed is None and name in EXPLICIT):
+        return trajectory
+    if problem.observed is None:
+        from shaftwork.integrate.linear.rounding_errors import spoiled
 
-    said = objection(problem, trajectory, name)
-    if said is None and problem.observed is None and name not in EXPLICIT and trajectory.t.size:
         said = spoiled(problem, trajectory.t, trajectory.x)
+    else:
+        from shaftwork.integrate.linear.verification import objection
+
+        said = objection(problem, problem.observed, trajectory, name)
     return replace(trajectory, caveat=said) if said else trajectory
 
 

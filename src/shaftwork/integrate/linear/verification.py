@@ -17,16 +17,16 @@ STILL = 64 * float(np.finfo(float).eps)
 SMALLEST = 1e-9
 
 
-def objection(problem: Problem, trajectory: Trajectory, engine: str) -> str | None:
+def objection(problem: Problem, observed: Observed, trajectory: Trajectory, engine: str) -> str | None:
     """What must be said of a run of a linear network, or None.
 
     Args:
         problem: what was solved.
-        trajectory: the run.
+        observed: all quantities of the network.
+        trajectory: the run, with a time at least.
         engine: that made it.
     """
-    observed = problem.observed
-    if observed is None or not trajectory.t.size or _goes_on_as_it_is(problem, trajectory):
+    if _goes_on_as_it_is(problem, trajectory):
         return None
     chosen = samples(trajectory.t.size)
     chosen = chosen[~np.isin(trajectory.t[chosen], problem.breakpoints)]  # values there have two sides

@@ -170,7 +170,7 @@ class TaylorRun:
             step = integrator.time - start
             good = not (step > 0.0 and np.isfinite(integrator.state).all()) or (
                 _satisfied(self.problem, self.problem.rhs, piece, integrator.tc, start, INSIDE[-1] * step, 0.0)
-                and keeps_sides(self.program, integrator, parameters, start)
+                and (self.program.all_timed or keeps_sides(self.program, integrator, parameters, start))
             )
             integrator.time = start
             integrator.state[:], integrator.pars[:] = state, parameters

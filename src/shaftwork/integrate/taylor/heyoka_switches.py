@@ -119,8 +119,6 @@ def keeps_sides(program: Any, integrator: Any, parameters: Array, start: float) 
         parameters: all parameters before the step, the signs included.
         start: of the step, s.
     """
-    if program.all_timed:
-        return True
     signs = parameters[program.signs]
     values = _in_step(program, integrator, start + INSIDE * (integrator.time - start), parameters)
     return bool((signs[:, None] * values >= -WRONG_SIDE * np.abs(values).max(axis=1)[:, None]).all())
