@@ -17,8 +17,6 @@ KNOWN, BRIEF = 1e-5, 100
 
 # A step that meets a guard is looked at in panels that are halved towards it, so many times; Gauss' nodes in each.
 PANELS, (NODES, WEIGHTS) = 14, np.polynomial.legendre.leggauss(4)
-# One that does not is made again in so many steps, unless it is shorter than this part of the whole run.
-SHORTER, LEAST = 8, 1e-9
 # Degree of the polynomial of a guard between two looks, and how many rounding units beside its zero it is checked.
 DEGREE, BESIDE = 12, 8
 
