@@ -25,6 +25,7 @@ class EngineEntry:
         extra: the extra that brings it.
         options: keyword arguments of the function.
         finest: relative tolerance below which it takes none; 0 where it has no step error.
+        loosest: the one above which it takes none.
         following: of an engine that follows guards, the part of the tolerance that it then runs with, and the loosest
             one: an error grows with every change of mode, by some hundreds through sixty contacts.
         absolute: whether it has an absolute tolerance.
@@ -37,6 +38,7 @@ class EngineEntry:
     extra: str = ""
     options: tuple[tuple[str, str], ...] = ()
     finest: float = 0.0
+    loosest: float = 1.0
     following: tuple[float, float] | None = None
     absolute: bool = True
 
@@ -71,7 +73,8 @@ ENGINES: dict[str, EngineEntry] = {
         "heyoka",
         "fast",
         finest=1e-15,
-        following=(1.0, 1e-12),  # the cost grows only with the logarithm
+        loosest=1e-10,  # the cost grows only with the logarithm, and a loose one loses events
+        following=(1.0, 1e-12),
     ),
     "sundials": EngineEntry(
         "shaftwork.integrate.sundials:solve",

@@ -11,6 +11,7 @@ from scipy.integrate import DOP853, OdeSolution, Radau
 
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.engines import ENGINES
+from shaftwork.integrate.guards import BRIEF
 from shaftwork.integrate.linear.rounding_errors import cancellation
 from shaftwork.integrate.problem import Array, Problem, Trajectory, tightened
 from shaftwork.integrate.smooth_intervals import GuardedFunctions, PiecewiseDense, SmoothInterval, failure, reached
@@ -23,12 +24,8 @@ METHODS: dict[str, Any] = {"DOP853": DOP853, "Radau": Radau}
 
 FINEST = ENGINES["scipy"].finest
 
-# A run is made again where the torques of dampers may be off by more than the first factor times the tolerance. On the
-# edge of stability errors are some 50 times as large as the tolerance that is asked for, hence the second.
-BEARABLE, EDGE = 2.0, 50.0
-# With steps of a smaller product of length and decay rate it is far from that edge, and every fast motion has steps of
-# its own.
-INSIDE, BRIEF = 1.0, 100
+# A run is made again where the torques of dampers may be off by more than this factor times the tolerance.
+BEARABLE = 2.0
 
 
 def solve(problem: Problem, method: Method = "DOP853") -> Trajectory:
@@ -53,7 +50,8 @@ def solve(problem: Problem, method: Method = "DOP853") -> Trajectory:
         few = slice(None) if problem.guards is None else [0, -1]  # of many short runs, each tells a little
         factor = cancellation(problem, times[few], states[few])
         if BEARABLE < factor < 1 / np.finfo(float).eps:  # it is beyond all bounds where nothing has moved yet
-            share = max(1 / (EDGE * factor), FINEST / problem.rtol)
+            # On the edge of stability errors are some 50 times as large as the tolerance that is asked for.
+            share = max(1 / (50 * factor), FINEST / problem.rtol)
             decay = rates(jacobians(problem)).decay
             # A longer step than is stable may well end right, because what is left of the fast motion is tiny at its
             # start, and yet be off inside by much more than the torque of a damper bears.
@@ -93,17 +91,18 @@ def _run(problem: Problem, method: Method, longest: float = np.inf) -> _Run:
 def _on_edge(problem: Problem, steps: Array) -> bool:
     """Whether one of the steps, by their ends (s,), is so long that it may be stability which bounds it.
 
-    The decay is looked at once for many brief phases in the same modes, and anew for a long one.
+    With a product of length and decay rate below 1 it is far from that, and every fast motion has steps of its own. The
+    decay is looked at once for many brief phases in the same modes, and anew for a long one.
     """
     longest, estimates = float(np.diff(steps).max()), problem.estimates
     long = steps.size - 1 > BRIEF
     if long or "decay" not in estimates:
         if long or "bound" not in estimates:
             estimates["bound"] = bound_of_decay(jacobians(problem))
-        if longest * estimates["bound"] <= INSIDE:
+        if longest * estimates["bound"] <= 1:
             return False
         estimates["decay"] = rates(jacobians(problem)).decay
-    return bool(longest * estimates["decay"] > INSIDE)
+    return bool(longest * estimates["decay"] > 1)
 
 
 def _starts(whole: March) -> tuple[Array, Array]:

@@ -15,12 +15,6 @@ from shaftwork.integrate.smooth_intervals import SmoothInterval, both_sides, fai
 
 # A run has stalled when so many steps together advance by less than so many times this part of the whole time.
 STALL_STEPS, STALL_SPAN = 2000, 1e-10
-# Where the motion rests at a switch of a law, this part is enough: ten million such steps would make a run. Where a law
-# is as the square root of the speed, such a run would not end otherwise.
-STUCK_SPAN = 1e-7
-# Into so many steps one is divided that does not obey the equations up to its guard, and the part of the whole run
-# that a step has to be longer than for that.
-SHORTER, LEAST = 8, 1e-9
 
 
 class Step(NamedTuple):
@@ -119,7 +113,7 @@ def march(problem: Problem | DaeProblem, stepper: Stepper) -> March:
         SimulationError: the method failed, the run has stalled, or `max_steps` were not enough.
     """
     x, pace, done = np.asarray(problem.x0, dtype=float), Pace(problem), list[SteppedPiece]()
-    left, shortest = problem.max_steps, LEAST * (problem.t_end - problem.t0)
+    left, shortest = problem.max_steps, 1e-9 * (problem.t_end - problem.t0)
     for piece in pieces(problem):
         watch, crossings = GuardWatch(problem, piece.low, piece.high), Crossings(problem, piece)
         t, x = piece.start, stepper.open(piece, piece.start, start_of_piece(problem, piece, x))
@@ -135,7 +129,7 @@ def march(problem: Problem | DaeProblem, stepper: Stepper) -> March:
             switch = crossings.cut(t, x, step.end, step.state, step.dense, again=not stepper.cuts_off)
             if guard is not None and (switch is None or guard <= switch):
                 if step.end - t > shortest and not watch.follows(t, x, guard, step.dense):
-                    stepper.again(t, x, piece.end, (step.end - t) / SHORTER)
+                    stepper.again(t, x, piece.end, (step.end - t) / 8)
                     continue
                 end, switch = guard, None
             else:
@@ -181,7 +175,9 @@ class Pace:
         if self._steps % STALL_STEPS:
             return None
         advance, self._since = t - self._since, t
-        if advance >= STALL_STEPS * (STUCK_SPAN if rests else STALL_SPAN) * self._duration:
+        # Where it rests, ten million such steps would make a run. Where a law is as the square root of the speed, such
+        # a run would not end otherwise.
+        if advance >= STALL_STEPS * (1e-7 if rests else STALL_SPAN) * self._duration:
             return None
         return (
             f"the last {STALL_STEPS} steps advanced by {advance:.2g} s only, as where the laws on both sides of a jump "

@@ -28,11 +28,8 @@ from shaftwork.integrate.sundials_solvers import (
 )
 from shaftwork.numerics.polynomials import Interpolant, interpolation_times
 
-# A run up to a guard is made again where this part of its tolerance would not do, and where it is not as tight already:
-# absolute tolerances of small twists may be that tight.
-ENOUGH, TIGHTEST_ATOL = 0.5, 1e-17
-# Of a run with output times so many numbers at the ends of its steps are kept.
-MOST_KEPT = 1_000_000
+# No tolerance is made tighter: absolute ones of small twists may be that tight.
+TIGHTEST_ATOL = 1e-17
 
 
 Opener = Callable[[SmoothInterval, Array], OpenedSolver]
@@ -115,7 +112,7 @@ def _run(problem: Problem | DaeProblem, opening: Opening, inner: InnerTimes) -> 
             return marched
         first, *others = marched.march.pieces
         states = [*first.states, *(state for piece in others for state in piece.states[1:])]
-        if (part := share_of_tolerance(tight, marched.march.steps, np.array(states))) > ENOUGH:
+        if (part := share_of_tolerance(tight, marched.march.steps, np.array(states))) > 0.5:
             return marched
         share = max(part * share, TIGHTEST_ATOL / problem.rtol)
 
@@ -194,7 +191,7 @@ def _trajectory(problem: Problem | DaeProblem, opening: Opening, degree: int) ->
     marched = _run(problem, opening, inner)
     whole, inside = marched.march, iter(marched.inside)
     steps = sum(len(piece.times) - 1 for piece in whole.pieces)
-    if steps * problem.x0.size <= MOST_KEPT:
+    if steps * problem.x0.size <= 1_000_000:  # more numbers than these are not kept
         dense.ends = whole.both_sides(problem)
     rows = [np.empty((0, whole.end[1].size))]
     for piece in whole.pieces:

@@ -25,8 +25,6 @@ ATTEMPTS = 5
 """A motion that was hidden altogether shows its size after two or three runs."""
 ENOUGH = 64
 """So many outputs show how large a motion is; fewer are no reason to look at the steps of heyoka, which costs a run."""
-LOOSEST = 1e-10
-"""The tolerance of heyoka, where no tighter one is asked for; it is absolute while all states are below one."""
 
 
 def in_its_size(form: StateForm, prepared: Prepared, demand: Demand, run: Callable[[Demand], Solution]) -> Solution:
@@ -58,7 +56,8 @@ def _hidden(motion: Solution, form: StateForm, demand: Demand, tolerances: Array
     largest, rtol = _largest(motion), demand.rtol
     overall = max(largest.values())
     if motion.engine == "heyoka":
-        absolute = min(rtol, LOOSEST) * demand.sizes.overall
+        # its one tolerance is absolute while all states are below one
+        absolute = min(rtol, ENGINES["heyoka"].loosest) * demand.sizes.overall
         return (
             Sizes(overall=10.0 ** math.floor(math.log10(overall))) if absolute > HIDDEN * rtol * overall > 0 else None
         )

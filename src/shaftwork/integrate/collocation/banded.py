@@ -25,12 +25,8 @@ from shaftwork.integrate.smooth_intervals import SmoothInterval, check_finite, f
 from shaftwork.integrate.stepping import March, Step, march
 from shaftwork.numerics.tolerances import SAME
 
-STAGES = 6
-# A step grows at least by the first factor, because its factors are made anew, and at most by the second.
-WORTH, GROW = 1.5, 8.0
-SAFETY, SHRINK, NEWTON_SHRINK = 0.9, 0.1, 0.25
-# A chain of damped springs has four entries a state at most; matrices of more may fill up.
-FEW_ENTRIES = 8
+# A step is chosen so much shorter than the error of the last one would let it be.
+SAFETY = 0.9
 
 
 def solve(problem: Problem) -> Trajectory:
@@ -63,7 +59,8 @@ def is_chain(problem: Problem) -> bool:
     if problem.straight is None and problem.jacobian is None:
         return False
     matrix = _matrix(problem)
-    return bool(matrix.nnz <= FEW_ENTRIES * matrix.shape[0])
+    # damped springs in a chain give four entries a state at most; matrices of more than eight may fill up
+    return bool(matrix.nnz <= 8 * matrix.shape[0])
 
 
 def is_undamped(problem: Problem) -> bool:
@@ -181,12 +178,13 @@ class _BandedStepper:
             raise failure(self.problem, "banded", t, x, reason)
         length, end = _fitted(t, self._step, piece.end)
         arc = self.arc(start, length)
-        factor = NEWTON_SHRINK if arc is None else self._factor(arc, np.maximum(start.scale, self.scale(arc.end)))
+        factor = 0.25 if arc is None else self._factor(arc, np.maximum(start.scale, self.scale(arc.end)))
         if arc is None or factor < SAFETY:
             self._step = factor * length
             return None
         check_finite(self.problem, "banded", end, arc.end)
-        self._arc, self._longer = arc, factor * length if factor > WORTH else 0.0
+        # a longer step has to be worth the factors that are made anew for it
+        self._arc, self._longer = arc, factor * length if factor > 1.5 else 0.0
         return Step(end, arc.end, arc.at)
 
     def again(self, t: float, x: Array, end: float, longest: float) -> None:  # noqa: ARG002 (it starts as it did)
@@ -214,10 +212,10 @@ class _BandedStepper:
 
     def _factor(self, arc: _Arc, scale: Array) -> float:
         """The factor by which the next step may be longer; below `SAFETY` this one was too long."""
-        error = self.method.peak * float((np.abs(arc.defect) / scale).max())
+        error, least, most = self.method.peak * float((np.abs(arc.defect) / scale).max()), 0.1, 8.0
         if not np.isfinite(error):
-            return SHRINK
-        return float(np.clip(SAFETY * max(error, 1e-300) ** (-1 / (self.method.order + 1)), SHRINK, GROW))
+            return least
+        return float(np.clip(SAFETY * max(error, 1e-300) ** (-1 / (self.method.order + 1)), least, most))
 
 
 class _BandedDense:
@@ -258,7 +256,7 @@ class _BandedDense:
 def _method(problem: Problem) -> ShiftedCollocation:
     """The method that suits a problem."""
     undamped = problem.straight is not None and is_undamped(problem)
-    return shifted_collocation("gauss" if undamped else "radau", STAGES)
+    return shifted_collocation("gauss" if undamped else "radau", 6)
 
 
 def _matrix(problem: Problem) -> Any:

@@ -13,8 +13,6 @@ from shaftwork.integrate.problem import TOLERATED, UNSURPRISING, Array, Observed
 
 # A state that changes by less, as a part of what its rate is made of, stands still but for rounding.
 STILL = 64 * float(np.finfo(float).eps)
-# A smaller error than this is not said of an engine, whatever its tolerance: rounding adds up over its steps.
-SMALLEST = 1e-9
 
 
 def objection(problem: Problem, observed: Observed, trajectory: Trajectory, engine: str) -> str | None:
@@ -47,7 +45,7 @@ def objection(problem: Problem, observed: Observed, trajectory: Trajectory, engi
     if run is None:
         return None
     added_up = min(trajectory.statistics.get("steps", 0) * problem.rtol, UNSURPRISING)
-    allowed = max(TOLERATED * problem.rtol, added_up, SMALLEST)
+    allowed = max(TOLERATED * problem.rtol, added_up, 1e-9)  # rounding adds up, too, whatever the tolerance
     limit = max(allowed - run.doubt, run.doubt)  # the exact motion may itself be off so far, either way
     wanted = observed.values(times, run.x)
     part, name = _part(observed, trajectory, np.abs(values - wanted).max(axis=0, initial=0.0), wanted, limit)
