@@ -18,6 +18,7 @@ from shaftwork.codegen.array_form.arrays import ArrayProgram, BoundArrays
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.code import branchwise, scalar
 from shaftwork.codegen.runs import MachineCode, RunProgram
+from shaftwork.codegen.time_switches import Switching
 from shaftwork.components.discontinuities import pieces_degree
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.calls import BoundedCache
@@ -309,6 +310,27 @@ class CompiledModel:
             f"phase = {getattr(name, 'name', name)!r}: the equations of '{self.form.graph.name}' are the same at all "
             "times. Take those of the model itself, such as model.rhs."
         )
+
+    @cached_property
+    def switching(self) -> Switching:
+        """What switches because of the time alone."""
+        return Switching(self.form)
+
+    def settled(self, p: Array) -> float:
+        """A time in s after which no law switches any more, for a parameter vector."""
+        return max((0.0, *self.switching.known(p))) + 1.0
+
+    @cached_property
+    def taylor_program(self) -> Any:
+        """The heyoka program, where there are rows, heyoka is installed and knows every function in them."""
+        if self.rows is None or find_spec("heyoka") is None:
+            return None
+        from shaftwork.codegen.taylor.heyoka import build
+
+        try:
+            return build(self.rows.states, TIME, self.rows.parameters, self.rows.rates)
+        except CompileError:
+            return None
 
     @cached_property
     def linear(self) -> bool:

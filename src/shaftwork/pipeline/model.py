@@ -12,8 +12,8 @@ import numpy as np
 
 from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
+from shaftwork.codegen.compiled_model import CompiledModel
 from shaftwork.codegen.model_observer import ModelObserver
-from shaftwork.codegen.operating import steady_state
 from shaftwork.codegen.start_values import initial_state, with_others
 from shaftwork.codegen.undefined_laws import refuse_vanishing
 from shaftwork.core.calls import BoundedCache, Callback
@@ -55,8 +55,8 @@ from shaftwork.pipeline.motion_start import (
     time_of_start,
     warn_of_rest,
 )
-from shaftwork.pipeline.prepared import EngineModel, OperatingPoint, Prepared
-from shaftwork.pipeline.settled import SteadyState, refuse_moving, warn_of_earlier_levels
+from shaftwork.pipeline.prepared import OperatingPoint, Prepared
+from shaftwork.pipeline.settled import SteadyState, steady_operation
 from shaftwork.pipeline.sizes import in_its_size, with_accuracy
 from shaftwork.results.solution import Solution
 
@@ -69,7 +69,7 @@ SIMILAR = 5.0
 """An engine suits parameters that differ by less than this factor too: looking anew would cost more than the run."""
 
 
-class Model(EngineModel):
+class Model(CompiledModel):
     """A network as a fast function of time, states and parameters, ready to be simulated again and again.
 
     Args:
@@ -84,6 +84,7 @@ class Model(EngineModel):
     def __init__(self, form: StateForm, netlist: Netlist, rebuild: Callable[[Netlist], Model]) -> None:
         super().__init__(form)
         self.netlist, self._rebuild = netlist, rebuild
+        self._prepared = BoundedCache[bytes, Prepared](1)
         self._variants = BoundedCache[tuple[tuple[str, float], ...], Model](VARIANTS)
         self._choices: list[tuple[tuple[float, float, float], Array, tuple[str, str]]] = []
 
@@ -168,9 +169,34 @@ class Model(EngineModel):
         prepared = self.prepare(self.vector(values) if values else self.defaults)
         return in_its_size(self.form, prepared, demand, lambda sized: self._run(prepared, initial, sized))
 
+    def prepare(self, p: Array) -> Prepared:
+        """Everything that depends on a parameter vector alone; the last one is kept."""
+        return self._prepared(p.tobytes(), lambda: Prepared(self, p))
+
+    def start(
+        self, prepared: Prepared, initial: Mapping[str, float] | None, span: tuple[float, float]
+    ) -> tuple[Array, Any]:
+        """The states (n,) at the start of a run, and what else is on its way then; without waves that is nothing.
+
+        Args:
+            prepared: the equations.
+            initial: start values, or where another motion ended; None for rest.
+            span: start and end of the run, s.
+
+        Raises:
+            SignalError: there is no such quantity.
+            ParameterError: values are not finite, contradict each other or leave something open.
+        """
+        if initial is None and not self.form.has_impulses:
+            return np.zeros(len(self.states)), None
+        after = prepared.just_after(span)
+        if isinstance(initial, Ending):
+            return prepared.taken_up(initial, after), None
+        return initial_state(prepared.bound, initial or {}, after), None
+
     def _run(self, prepared: Prepared, initial: Given, demand: Demand) -> Solution:
         x0, waves = self.start(prepared, initial, demand.span)
-        problem, bind = self.problem(prepared, x0, demand), lambda: prepared.bound
+        problem, bind = prepared.problem(x0, demand), lambda: prepared.bound
         refuse_vanishing(self.form, bind, lambda: np.array([problem.t0]), lambda _: x0[None])
         trajectory, name, why = self._solve(prepared, problem, demand.engine, waves)
         refuse_vanishing(self.form, bind, lambda: trajectory.dense.steps, trajectory.dense)
@@ -183,7 +209,7 @@ class Model(EngineModel):
             why=why,
             statistics=trajectory.statistics,
             dense=trajectory.dense,
-            observer=ModelObserver(self.form, bind, self.switching.timeline(prepared.p, *demand.span)),
+            observer=ModelObserver(self.form, bind, prepared.instants(demand.span)),
             caveat=trajectory.caveat,
         )
 
@@ -213,15 +239,7 @@ class Model(EngineModel):
         return self._steady(values, time, initial)
 
     def _steady(self, values: Mapping[str, float], t: float, initial: Given) -> SteadyState:
-        prepared = self.prepare(self.vector(values) if values else self.defaults)
-        when = t if math.isfinite(t) else self.settled(prepared.p)
-        start = initial_state(prepared.bound, initial or {}, when)
-        if not math.isfinite(t):
-            refuse_moving(prepared.bound, when, self.switching)
-        x = steady_state(prepared.bound, start, when)
-        if not math.isfinite(t):
-            warn_of_earlier_levels(prepared.bound, x, when, self.switching)
-        return SteadyState(dict(zip(self.states, x.tolist(), strict=True)), when)
+        return steady_operation(self.prepare(self.vector(values) if values else self.defaults), t, initial or {})
 
     def start_equations(self, values: Mapping[str, float]) -> BoundArrays:
         """The equations of which start values tell the states."""
@@ -282,7 +300,7 @@ class Model(EngineModel):
     def _choice(self, demand: Demand) -> tuple[str, str]:
         prepared = self.prepare(self.defaults)
         x0, _ = self.start(prepared, None, demand.span)
-        return self._engine(prepared, self.problem(prepared, x0, demand), "auto")
+        return self._engine(prepared, prepared.problem(x0, demand), "auto")
 
     def _solve(
         self,
