@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from importlib.util import find_spec
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from sympy import Symbol, count_ops, cse
@@ -24,25 +24,10 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import CompileError, MissingExtraError, ParameterError
 from shaftwork.core.parameters import in_si, is_quantity, without_unit
-from shaftwork.formulation.explicit_rows import BlockTooLargeError, Rows, explicit_rows
+from shaftwork.formulation.explicit_rows import FEW_SETS, SCALAR, SWITCHING, BlockTooLargeError, Rows, explicit_rows
 from shaftwork.formulation.form import StateForm
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.kinds import Kind
-
-
-class Largest(NamedTuple):
-    """Up to how many states and branches unrolled code saves more than it costs to make."""
-
-    states: int
-    branches: int
-
-
-SCALAR, SWITCHING = Largest(64, 400), Largest(1200, 6000)
-"""Of all networks, and of those whose parts change their mode in few sets of equations: each event is looked at by
-itself, which takes arrays 50 times as long as scalar code. 65 states with 114 events: 1.2 s, then 0.03 s a run, and
-4.5 s by arrays; 385 states with 261 events: 4 s, then 0.7 s, and 15 s by arrays."""
-FEW_SETS = 4
-"""So many sets of equations are few."""
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import importlib
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 
 from shaftwork.core.errors import MissingExtraError, ParameterError, SimulationError
 from shaftwork.integrate.engines import ADAMS, ENGINES, INNER
@@ -161,15 +161,27 @@ def load(name: str) -> Engine:
     entry = INNER.get(name) or ENGINES[name]
     if not entry.installed:
         raise MissingExtraError(entry.distribution, entry.extra, f"engine={name!r}")
-    module, function = entry.function.split(":")
-    run = getattr(importlib.import_module(module), function)
-    options = dict(entry.options)
+    match name:
+        case "exact":
+            from shaftwork.integrate.linear import propagation
 
-    def engine(problem: Problem) -> Trajectory:
-        trajectory: Trajectory = run(problem, **options)
-        return trajectory
+            return propagation.solve
+        case "heyoka":
+            from shaftwork.integrate.taylor import heyoka_taylor
 
-    return engine
+            return heyoka_taylor.solve
+        case "sundials" | "sundials-adams":
+            from shaftwork.integrate import sundials
+
+            return partial(sundials.solve, method="BDF" if name == "sundials" else "Adams")
+        case "banded":
+            from shaftwork.integrate.collocation import banded
+
+            return banded.solve
+        case _:
+            from shaftwork.integrate import scipy_ivp
+
+            return partial(scipy_ivp.solve, method="DOP853" if name == "scipy" else "Radau")
 
 
 def _stiff(problem: Problem, *, compiled: bool) -> tuple[str, str] | None:

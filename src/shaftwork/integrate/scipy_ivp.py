@@ -15,7 +15,7 @@ from shaftwork.integrate.guards import BRIEF
 from shaftwork.integrate.linear.rounding_errors import cancellation
 from shaftwork.integrate.problem import Array, Problem, Trajectory, tightened
 from shaftwork.integrate.smooth_intervals import GuardedFunctions, PiecewiseDense, SmoothInterval, failure, reached
-from shaftwork.integrate.stepping import March, Step, march
+from shaftwork.integrate.stepping import Step, SteppedRun, march
 from shaftwork.integrate.stiffness import STABLE, bound_of_decay, jacobians, rates
 
 Method = Literal["DOP853", "Radau"]
@@ -69,7 +69,7 @@ def solve(problem: Problem, method: Method = "DOP853") -> Trajectory:
 class _Run(NamedTuple):
     """All steps, dense output and counts by name."""
 
-    march: March
+    march: SteppedRun
     dense: PiecewiseDense
     counts: dict[str, int]
 
@@ -105,7 +105,7 @@ def _on_edge(problem: Problem, steps: Array) -> bool:
     return bool(longest * estimates["decay"] > 1)
 
 
-def _starts(whole: March) -> tuple[Array, Array]:
+def _starts(whole: SteppedRun) -> tuple[Array, Array]:
     """Times and states at the starts of all steps: there no input is in the midst of a jump."""
     times = [time for piece in whole.pieces for time in piece.times[:-1]]
     return np.array(times), np.array([state for piece in whole.pieces for state in piece.states[:-1]])

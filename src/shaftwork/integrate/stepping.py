@@ -73,7 +73,7 @@ class SteppedPiece:
     states: list[Array]
 
 
-class March(NamedTuple):
+class SteppedRun(NamedTuple):
     """All steps of a run.
 
     Args:
@@ -106,7 +106,7 @@ def _columns(piece: SteppedPiece) -> tuple[list[float], list[Array]]:
     return piece.times, piece.states
 
 
-def march(problem: Problem | DaeProblem, stepper: Stepper) -> March:
+def march(problem: Problem | DaeProblem, stepper: Stepper) -> SteppedRun:
     """Step through all pieces of a problem, up to the first guard that is met.
 
     Raises:
@@ -145,10 +145,10 @@ def march(problem: Problem | DaeProblem, stepper: Stepper) -> March:
             done[-1].states.append(state)
             t, x = end, state
             if guard is not None and t < piece.end:
-                return March(done, watch.met)
+                return SteppedRun(done, watch.met)
             if switch is not None and t < piece.end:
                 x = stepper.open(piece, t, x)
-    return March(done, None)
+    return SteppedRun(done, None)
 
 
 class Pace:

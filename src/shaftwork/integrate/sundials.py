@@ -16,7 +16,7 @@ from shaftwork.core.errors import MissingExtraError
 from shaftwork.integrate.guards import share_of_tolerance
 from shaftwork.integrate.problem import Array, DaeProblem, Problem, Trajectory, tightened
 from shaftwork.integrate.smooth_intervals import PiecewiseDense, SmoothInterval, check_finite, failure
-from shaftwork.integrate.stepping import March, Step, march
+from shaftwork.integrate.stepping import Step, SteppedRun, march
 from shaftwork.integrate.sundials_solvers import (
     DEGREES,
     JacobianPattern,
@@ -92,7 +92,7 @@ InnerTimes = Callable[[float, float], Array]
 class _Marched:
     """A run: its steps, and of each the states (k, n) that were wanted in it."""
 
-    march: March
+    march: SteppedRun
     inside: list[Array]
 
 

@@ -22,7 +22,7 @@ from shaftwork.integrate.collocation.banded_stages import (
 from shaftwork.integrate.engines import ENGINES
 from shaftwork.integrate.problem import Array, Problem, Trajectory
 from shaftwork.integrate.smooth_intervals import SmoothInterval, check_finite, failure, pieces
-from shaftwork.integrate.stepping import March, Step, march
+from shaftwork.integrate.stepping import Step, SteppedRun, march
 from shaftwork.numerics.tolerances import SAME
 
 # A step is chosen so much shorter than the error of the last one would let it be.
@@ -221,7 +221,7 @@ class _BandedStepper:
 class _BandedDense:
     """The motion at any time, from steps that are made again: their polynomials would fill the memory."""
 
-    def __init__(self, whole: March, stepper: _BandedStepper) -> None:
+    def __init__(self, whole: SteppedRun, stepper: _BandedStepper) -> None:
         self._pieces, self._stepper, self.steps = whole.pieces, stepper, whole.steps
         self._places = [(k, step) for k, piece in enumerate(whole.pieces) for step in range(len(piece.times) - 1)]
 
