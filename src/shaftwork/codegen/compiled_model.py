@@ -109,10 +109,14 @@ class CompiledModel:
     def __init__(self, form: StateForm) -> None:
         self.form = form
         self.parameters: Mapping[str, float] = MappingProxyType(dict(form.graph.parameters))
-        self.arrays = ArrayProgram(form)
         self.defaults = np.array(list(self.parameters.values()), dtype=float)
         self._bound = BoundedCache[bytes, BoundArrays](1)
         self._machine: MachineCode | None = None
+
+    @cached_property
+    def arrays(self) -> ArrayProgram:
+        """The equations as sparse matrices and nonlinear rows."""
+        return ArrayProgram(self.form)
 
     @cached_property
     def states(self) -> tuple[str, ...]:

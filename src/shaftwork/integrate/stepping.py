@@ -96,14 +96,16 @@ class SteppedRun(NamedTuple):
         first, *others = self.pieces
         return np.array([*first.times, *(time for piece in others for time in piece.times[1:])])
 
+    @property
+    def states(self) -> Array:
+        """(s, n) states then, before any jump."""
+        first, *others = self.pieces
+        return np.array([*first.states, *(state for piece in others for state in piece.states[1:])])
+
     def both_sides(self, problem: TimedProblem) -> tuple[Array, Array]:
         """Times (k,) and states (k, n) at the ends of the steps, on both sides of jumps."""
-        times, states = ([np.array(rows) for rows in each] for each in zip(*map(_columns, self.pieces), strict=True))
-        return both_sides(problem, times, states)
-
-
-def _columns(piece: SteppedPiece) -> tuple[list[float], list[Array]]:
-    return piece.times, piece.states
+        times = [np.array(piece.times) for piece in self.pieces]
+        return both_sides(problem, times, [np.array(piece.states) for piece in self.pieces])
 
 
 def march(problem: Problem | DaeProblem, stepper: Stepper) -> SteppedRun:

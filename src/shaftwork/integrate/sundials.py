@@ -110,9 +110,7 @@ def _run(problem: Problem | DaeProblem, opening: Opening, inner: InnerTimes) -> 
             marched = _Marched(march(tight, stepper), stepper.inside)
         if marched.march.met is None or tight.rtol <= TIGHTEST_ATOL:
             return marched
-        first, *others = marched.march.pieces
-        states = [*first.states, *(state for piece in others for state in piece.states[1:])]
-        if (part := share_of_tolerance(tight, marched.march.steps, np.array(states))) > 0.5:
+        if (part := share_of_tolerance(tight, marched.march.steps, marched.march.states)) > 0.5:
             return marched
         share = max(part * share, TIGHTEST_ATOL / problem.rtol)
 

@@ -20,7 +20,6 @@ from shaftwork.core.calls import BoundedCache, Callback
 from shaftwork.core.errors import Diagnostic, ParameterError
 from shaftwork.core.notices import PulsationWarning, muted
 from shaftwork.core.parameters import in_si
-from shaftwork.core.screen import counted, named, on_one_screen
 from shaftwork.formulation.form import StateForm
 from shaftwork.integrate import choice
 from shaftwork.integrate.engines import EngineName, available
@@ -55,9 +54,9 @@ from shaftwork.pipeline.motion_start import (
     time_of_start,
     warn_of_rest,
 )
-from shaftwork.pipeline.prepared import OperatingPoint, Prepared
+from shaftwork.pipeline.overview import overview
+from shaftwork.pipeline.prepared import OperatingPoint, Prepared, in_its_size, with_accuracy
 from shaftwork.pipeline.settled import SteadyState, steady_operation
-from shaftwork.pipeline.sizes import in_its_size, with_accuracy
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
@@ -92,7 +91,7 @@ class Model(CompiledModel):
         return model_again, remember(self, self._rebuild)
 
     def __repr__(self) -> str:
-        return _overview(self)
+        return overview(self)
 
     @property
     def name(self) -> str:
@@ -141,7 +140,8 @@ class Model(CompiledModel):
             SimulationError: the integration failed; says when, in which state and why.
             MissingExtraError: the engine asked for is not installed.
         """
-        refuse_unrecorded(self.form, as_names(angles))
+        if angles:
+            refuse_unrecorded(self.form, as_names(angles))
         values = self._checked_all(parameters)
         if isinstance(initial, Solution):
             initial = ending_of(initial, self.form.graph)
@@ -197,9 +197,11 @@ class Model(CompiledModel):
     def _run(self, prepared: Prepared, initial: Given, demand: Demand) -> Solution:
         x0, waves = self.start(prepared, initial, demand.span)
         problem, bind = prepared.problem(x0, demand), lambda: prepared.bound
-        refuse_vanishing(self.form, bind, lambda: np.array([problem.t0]), lambda _: x0[None])
+        if self.form.doubtful:
+            refuse_vanishing(self.form, bind, lambda: np.array([problem.t0]), lambda _: x0[None])
         trajectory, name, why = self._solve(prepared, problem, demand.engine, waves)
-        refuse_vanishing(self.form, bind, lambda: trajectory.dense.steps, trajectory.dense)
+        if self.form.doubtful:
+            refuse_vanishing(self.form, bind, lambda: trajectory.dense.steps, trajectory.dense)
         return Solution(
             name=self.name,
             t=trajectory.t,
@@ -338,8 +340,9 @@ class Model(CompiledModel):
 
     def _changes_structure(self, values: Mapping[str, float]) -> bool:
         """Whether other equations hold for new values."""
-        differs = changes_structure(self.form, values)
-        return differs or (bool(values) and self.arrays.assembly.degenerates(self.vector(values)))
+        if not values:
+            return False
+        return changes_structure(self.form, values) or self.arrays.assembly.degenerates(self.vector(values))
 
     def _checked_all(self, parameters: Mapping[str, float] | None) -> dict[str, float]:
         if parameters is None:
@@ -351,34 +354,6 @@ class Model(CompiledModel):
     def _variant(self, values: Mapping[str, float]) -> Model:
         """The model of the same network with other values where these change its structure; the last few are kept."""
         return self._variants(tuple(sorted(values.items())), lambda: self._rebuild(self.netlist.with_values(values)))
-
-
-def _overview(model: Model) -> str:
-    """States, parameters with their values, and the modes of parts that change theirs."""
-    sizes = f"{counted(len(model.states), 'state')}, {counted(len(model.parameters), 'parameter')}"
-    kind = "linear" if not model.form.waves and model.linear else "nonlinear"
-    values = [f"{name} = {value:.6g}" for name, value in model.parameters.items()]
-    changing = [
-        f"{part.name}: {', '.join(dict.fromkeys(mode.words for element in part.modes for mode in element.options))}"
-        for part in model.form.graph.parts
-        if part.modes
-    ]
-    waves = [model.form.graph.part_of(end).name for end in model.form.waves[::2]]
-    lines = [
-        *named("states", model.states),
-        *named("travelling waves", waves),
-        *named("parameters", values, most=6),
-        *(
-            line
-            for text in changing[:6]
-            for line in named(text.partition(": ")[0], text.partition(": ")[2].split(", "))
-        ),
-    ]
-    return on_one_screen(
-        f"Model of '{model.name}': {sizes}, {kind if not changing else 'parts that change their mode'}",
-        lines,
-        len(lines),
-    )
 
 
 def steady_start(
