@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -45,7 +46,9 @@ def diagnose(netlist: Netlist) -> tuple[CircuitGraph | None, StateForm | None, t
     Returns:
         Graph and state form, None where a part is wrong, and every problem: of parts, of connections, of equations.
     """
-    repaired, typed = examine(netlist)
+    # where modes are chosen, the network has passed the checks of its parts before
+    in_modes = any(placed.choices for placed in netlist.placed)
+    repaired, typed = (replace(netlist, ports=()), ()) if in_modes else examine(netlist)
     if not repaired.placed:
         return None, None, typed
     graph = build_graph(repaired)

@@ -29,9 +29,8 @@ from shaftwork.hybrid.named_phases import known_modes, modes_in, whole_name, wor
 from shaftwork.network.netlist import listed
 from shaftwork.pipeline.arguments import Demand, Given, Point, Time
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.prepared import OperatingPoint
+from shaftwork.pipeline.prepared import OperatingPoint, in_its_size
 from shaftwork.pipeline.settled import SteadyState, refuse_moving, warn_of_earlier_levels
-from shaftwork.pipeline.sizes import in_its_size
 from shaftwork.results.solution import Solution
 
 MOST_CHANGES = 100

@@ -249,7 +249,7 @@ def _numbers(part: Component) -> tuple[str, ...]:
 
 def changes_structure(form: StateForm, values: Mapping[str, float]) -> bool:
     """Whether other equations hold for new values: one becomes zero or ceases to, decides a ratio, or is of `Auto`."""
-    decisive = frozenset((*form.graph.zeros, *form.tree.frozen)) if values else frozenset()
+    decisive = frozenset((*form.graph.zeros, *form.tree.frozen))
     return any(name in decisive or value == 0 for name, value in values.items()) or branches_anew(form.graph, values)
 
 

@@ -12,6 +12,7 @@ from scipy.linalg import eig, matrix_balance
 from sympy import Symbol
 
 from shaftwork.codegen.array_form.elements import Array
+from shaftwork.codegen.compiled_model import CompiledModel
 from shaftwork.components.law_slopes import slope
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.noise import HeldNoise, SmoothNoise
@@ -20,7 +21,6 @@ from shaftwork.pipeline.arguments import Given, Point, Time, by_name, relative_t
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import refuse_motion
 from shaftwork.pipeline.network import Network, network_of
-from shaftwork.pipeline.prepared import EngineModel
 from shaftwork.results.course import SMALLEST, turning_points
 from shaftwork.results.measures import EXTREMES, KINDS, POWERS, Measure
 from shaftwork.results.observer import Complex
@@ -246,7 +246,7 @@ def _extreme(measure: Measure, slopes: MotionSlopes) -> tuple[float, Array]:
 
 
 def smooth_parameters(
-    model: Model, names: Sequence[str] | None, used: Sequence[EngineModel], span: tuple[float, float] | None = None
+    model: Model, names: Sequence[str] | None, used: Sequence[CompiledModel], span: tuple[float, float] | None = None
 ) -> tuple[str, ...]:
     """The parameters by which to differentiate.
 
@@ -281,7 +281,7 @@ def smooth_parameters(
     return tuple(names)
 
 
-def _seeds(model: EngineModel) -> Iterator[str]:
+def _seeds(model: CompiledModel) -> Iterator[str]:
     graph = model.form.graph
     for branch in graph.branches:
         law = graph.in_network_symbols(branch.template.law, branch)
@@ -289,7 +289,7 @@ def _seeds(model: EngineModel) -> Iterator[str]:
             yield from (symbol.name for symbol in noise.args[1].free_symbols)
 
 
-def _at_edges(model: EngineModel, span: tuple[float, float]) -> Iterator[str]:
+def _at_edges(model: CompiledModel, span: tuple[float, float]) -> Iterator[str]:
     """Parameters that move a switch of a law of time, or of a mode, which is at the start or at the end of a motion."""
     switching, p = model.switching, model.defaults
     instants = switching.timeline(p, *span)

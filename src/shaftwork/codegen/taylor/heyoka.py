@@ -15,12 +15,12 @@ import sympy
 from numpy.typing import NDArray
 
 from shaftwork.codegen.array_form.elements import Array
-from shaftwork.codegen.compiled_model import SCALAR
 from shaftwork.codegen.taylor.heyoka_parameters import Fixed, HeldParameters
 from shaftwork.components.discontinuities import parts
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.calls import interruptible
 from shaftwork.core.errors import MissingExtraError
+from shaftwork.formulation.explicit_rows import SCALAR
 
 
 class Fading(NamedTuple):

@@ -10,16 +10,10 @@ from numpy.typing import NDArray
 from shaftwork.integrate.problem import Array
 from shaftwork.numerics.zeros import LOOKS
 
-# So many steps in a row, each shorter than this part of the whole time, are chatter and not motion.
-CHATTER_STEPS, CHATTER_SPAN = 200, 1e-9
 # A switch that is on the wrong side by more than this part of its largest value has missed its event.
 WRONG_SIDE = 1e-9
-# What comes back on one side more slowly than at this part of the speed on the other may be a touch.
-BACK = 1e-3
 # How far rounding may have moved time and states, as a part of them.
 ROUNDINGS = 256 * float(np.finfo(float).eps)
-# Where in a trial step a switch that starts at zero is looked at: as early as it is not lost in rounding.
-EARLY = (1e-4, 1e-2, 1e-1)
 
 # Where in a piece switches of the time are read: a law that touches its threshold does so in the middle, if anywhere.
 SOMEWHERE = 0.381966
@@ -87,7 +81,7 @@ def _early_signs(program: Any, integrator: Any, horizon: float) -> Array:
     integrator.step(max_delta_t=horizon, write_tc=True)
     step = integrator.time - start
     signs = np.zeros(len(program.switches))
-    times = start + np.outer(EARLY, (0.5, 1.0)).ravel() * step
+    times = start + np.outer((1e-4, 1e-2, 1e-1), (0.5, 1.0)).ravel() * step  # as early as it is not lost in rounding
     sides = np.sign(_in_step(program, integrator, times, parameters))
     for first, second in zip(sides.T[::2], sides.T[1::2], strict=True):
         signs = np.where((signs == 0.0) & (first == second), second, signs)  # rounding would have no steady sign
@@ -119,8 +113,6 @@ def keeps_sides(program: Any, integrator: Any, parameters: Array, start: float) 
         parameters: all parameters before the step, the signs included.
         start: of the step, s.
     """
-    if program.all_timed:
-        return True
     signs = parameters[program.signs]
     values = _in_step(program, integrator, start + INSIDE * (integrator.time - start), parameters)
     return bool((signs[:, None] * values >= -WRONG_SIDE * np.abs(values).max(axis=1)[:, None]).all())
@@ -138,7 +130,8 @@ class SwitchWatch:
 
     def __init__(self, program: Any, start: float, duration: float, size: Array) -> None:
         self._program = program
-        self._short = CHATTER_SPAN * duration
+        self._short = 1e-9 * duration
+        """Many shorter steps in a row are chatter and not motion."""
         self._short_steps = 0
         self._last = start
         self.last_good: tuple[float, Array] | None = None
@@ -209,7 +202,7 @@ class SwitchWatch:
         stuck = None
         if wrong is not None and wrong.any():
             stuck = np.argmax(wrong)
-        elif self._short_steps > CHATTER_STEPS:
+        elif self._short_steps > 200:
             stuck = np.argmin(np.where(self._moving, np.abs(values), np.inf))
         if stuck is not None:
             self.driven_back = self._drives_back(integrator, int(stuck))
@@ -243,7 +236,8 @@ class SwitchWatch:
             here = program.switch_values(time, state, pars)[number]
             there = program.switch_values(time + self._short, later, pars)[number]
             speeds.append(side * (there - here))
-        return bool(max(speeds) < -BACK * max(map(abs, speeds)) < 0.0)
+        # What comes back on one side more slowly than at 1e-3 of the speed on the other may be a touch.
+        return bool(max(speeds) < -1e-3 * max(map(abs, speeds)) < 0.0)
 
     def _ended_at_a_switch(self, integrator: Any) -> bool:
         """Whether the last step ended where a switch passed through zero."""
