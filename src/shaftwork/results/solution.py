@@ -231,7 +231,7 @@ class Solution:
         An `AccuracyWarning` says where output times are too far apart to show how the named quantities, or else the
         states, swing.
         """
-        table = to_pandas(self.reader, self.t, self.x, names or self.names)
+        table = to_pandas(self, names or self.names)
         self._warn_of_coarse_samples(names)
         return table
 
@@ -240,9 +240,9 @@ class Solution:
 
         One along a shaft has its places in m as second dimension, "line.tau.x". Warns as `to_pandas` does.
         """
-        data = to_xarray(self.reader, self.t, self.x, names or self.names)
+        data = to_xarray(self, names or self.names, {"title": self.name, "engine": self.engine, "why": self.why})
         self._warn_of_coarse_samples(names)
-        return data.assign_attrs({"engine": self.engine, "why": self.why})
+        return data
 
     def plot(self, *names: str) -> Figure:
         """Curves over time, those of like size and the same unit on one axis, and the phases below (extra `plot`)."""
