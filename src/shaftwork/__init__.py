@@ -84,7 +84,7 @@ if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
     from shaftwork.equations.notations import Inverse as Inverse, Notation as Notation
     from shaftwork.pipeline.model import Model as Model
     from shaftwork.pipeline.network import Network as Network
-    from shaftwork.reporting.document import Report as Report, report as report
+    from shaftwork.reporting.report import Report as Report, report as report
     from shaftwork.results.fatigue import SNLine as SNLine
     from shaftwork.results.solution import Solution as Solution
 
@@ -139,7 +139,7 @@ _HOME = {
     "shaftwork.equations.notations": ("Inverse", "Notation"),
     "shaftwork.pipeline.model": ("Model",),
     "shaftwork.pipeline.network": ("Network",),
-    "shaftwork.reporting.document": ("Report", "report"),
+    "shaftwork.reporting.report": ("Report", "report"),
     "shaftwork.results.fatigue": ("SNLine",),
     "shaftwork.results.solution": ("Solution",),
 }

@@ -13,7 +13,7 @@ import pytest
 import shaftwork as sw
 from shaftwork.cli import main
 from shaftwork.latex.printing import printed_number
-from shaftwork.reporting.document import SECTIONS
+from shaftwork.reporting.report import SECTIONS
 from shaftwork.scenes import SCENES
 from tests.latex.test_equations_in_print import compile_latex, compiles, overfull
 

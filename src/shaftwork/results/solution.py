@@ -16,12 +16,12 @@ from shaftwork.core.notices import warn
 from shaftwork.core.screen import counted, named, on_one_screen
 from shaftwork.integrate.problem import TOLERATED, UNSURPRISING
 from shaftwork.results.course import SMALLEST
+from shaftwork.results.data_frames import to_pandas, to_xarray
 from shaftwork.results.energy import EnergyBalance, energy_balance
 from shaftwork.results.extremes import Extreme, Extremes, warn_of_coarse_samples
 from shaftwork.results.fatigue import Damage, Rainflow, SNLine, damage_of, damages, load_cycles
 from shaftwork.results.observer import Array, DenseStates, Observer, PhaseRow, Reader, array_in_si, span_of
 from shaftwork.results.plotting import plot_signals
-from shaftwork.results.tables import to_pandas, to_xarray
 
 if TYPE_CHECKING:
     import pandas as pd

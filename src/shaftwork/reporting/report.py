@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from shaftwork.core.errors import ParameterError
 from shaftwork.equations.spelling import in_text
@@ -132,6 +132,36 @@ class Report:
         return f"Report '{self.title}'\n{textwrap.fill(headings, 100, initial_indent='  ', subsequent_indent='  ')}"
 
 
+class Contents(TypedDict, total=False):
+    """What a report can have besides the network and its motion.
+
+    Args:
+        signals: quantities to draw and to list; by default those of the scene, or the states.
+        phases: combinations of modes whose equations are printed; by default those that last longest.
+        at: the point about which frequencies are computed, as for `Network.modes`.
+        speeds: (k,) rad/s, of a Campbell diagram.
+        orders: its excitations per turn, by default 1, 2 and 3.
+        sn: the S-N line of what is twisted, or one for each quantity.
+        origins: where values come from, by part or by "part.parameter": a column of the table of values.
+        assumptions: what was chosen and why, a sentence each.
+        references: literature, a line each.
+        comparison: of models of a shaft, from `studies.work_precision`.
+        torsional: a torsional vibration calculation.
+    """
+
+    signals: Sequence[str]
+    phases: Sequence[str]
+    at: Point
+    speeds: Sequence[float]
+    orders: Sequence[float]
+    sn: SNLine | Mapping[str, SNLine]
+    origins: Mapping[str, str]
+    assumptions: Sequence[str]
+    references: Sequence[str]
+    comparison: Any
+    torsional: Any
+
+
 def report(
     subject: Network | Scene,
     *,
@@ -142,19 +172,9 @@ def report(
     date: str | None = None,
     revision: str = "",
     source: str | None = None,
-    signals: Sequence[str] | None = None,
-    phases: Sequence[str] = (),
-    at: Point = None,
-    speeds: Sequence[float] = (),
-    orders: Sequence[float] = (1, 2, 3),
-    sn: SNLine | Mapping[str, SNLine] | None = None,
-    origins: Mapping[str, str] | None = None,
-    assumptions: Sequence[str] = (),
-    references: Sequence[str] = (),
-    comparison: Any = None,
-    torsional: Any = None,
     text: Mapping[str, str] | None = None,
     sections: Sequence[str] | None = None,
+    **contents: Unpack[Contents],
 ) -> Report:
     """A report on a network, with everything that someone needs who answers for its numbers.
 
@@ -167,24 +187,13 @@ def report(
         date: in words; by default today's.
         revision: of the document.
         source: where the system comes from.
-        signals: quantities to draw and to list; by default those of the scene, or the states.
-        phases: combinations of modes whose equations are printed; by default those that last longest.
-        at: the point about which frequencies are computed, as for `Network.modes`.
-        speeds: (k,) rad/s, of a Campbell diagram.
-        orders: its excitations per turn.
-        sn: the S-N line of what is twisted, or one for each quantity.
-        origins: where values come from, by part or by "part.parameter": a column of the table of values.
-        assumptions: what was chosen and why, a sentence each.
-        references: literature, a line each.
-        comparison: of models of a shaft, from `studies.work_precision`.
-        torsional: a torsional vibration calculation.
         text: your own words in Markdown, by section; "introduction" and "conclusions" are sections of their own.
         sections: those wanted, by name; by default all that have anything to say.
+        **contents: what else it has, see `Contents`.
 
     Raises:
         ParameterError: there is no such section.
-        NetworkError: the network cannot be assembled; lists every reason.
-        SimulationError: the integration failed.
+        NetworkError, SimulationError: the network cannot be assembled, or its motion failed.
         MissingExtraError: matplotlib is not installed, or pandoc for words in Markdown.
 
     Examples:
@@ -195,39 +204,47 @@ def report(
     """
     words, wanted = _checked(text or {}, sections)
     scene = subject if isinstance(subject, Scene) else None
-    network = scene() if scene else network_of(subject)
-    end = t_end if t_end is not None else scene.t_end if scene else None
-    if solution is None and end is not None:
-        solution = network.simulate(end)
-    origin = source if source is not None else scene.source if scene else ""
-    known = signals if signals is not None else scene.signals if scene else _states(solution)
-    about = Subject(
-        network=network,
-        solution=solution,
-        source=origin,
-        signals=tuple(known),
-        phases=tuple(phases),
-        at=at,
-        speeds=speeds,
-        orders=orders,
-        sn=sn,
-        origins=origins or {},
-        assumptions=(*(scene.chosen if scene else ()), *assumptions),
-        references=(*references, *(full for short, full in LITERATURE.items() if short in origin)),
-        comparison=comparison,
-        torsional=torsional,
-    )
-    headed = title if title is not None else scene.title if scene else network.name
+    about = _subject(subject, solution, t_end, source, contents)
+    headed = title if title is not None else scene.title if scene else about.network.name
+    today = dt.datetime.now().astimezone().date().isoformat()
     return Report(
         title=headed[:1].upper() + headed[1:],
         author=author,
-        date=date if date is not None else dt.datetime.now().astimezone().date().isoformat(),
+        date=date if date is not None else today,
         revision=revision,
-        source=origin,
+        source=about.source,
         sections=tuple(_written(about, words, wanted)),
         figures=about.figures,
         curves=about.curves,
-        solution=solution,
+        solution=about.solution,
+    )
+
+
+def _subject(
+    subject: Network | Scene, solution: Solution | None, t_end: float | None, source: str | None, contents: Contents
+) -> Subject:
+    """What the sections are written of; a scene says what the user does not."""
+    scene = subject if isinstance(subject, Scene) else None
+    network = subject() if isinstance(subject, Scene) else network_of(subject)
+    end = t_end if t_end is not None else scene.t_end if scene else None
+    motion = network.simulate(end) if solution is None and end is not None else solution
+    origin = source if source is not None else scene.source if scene else ""
+    literature = (full for short, full in LITERATURE.items() if short in origin)
+    return Subject(
+        network=network,
+        solution=motion,
+        source=origin,
+        signals=tuple(contents.get("signals", scene.signals if scene else _states(motion))),
+        phases=tuple(contents.get("phases", ())),
+        at=contents.get("at"),
+        speeds=contents.get("speeds", ()),
+        orders=contents.get("orders", (1, 2, 3)),
+        sn=contents.get("sn"),
+        origins=contents.get("origins", {}),
+        assumptions=(*(scene.chosen if scene else ()), *contents.get("assumptions", ())),
+        references=(*contents.get("references", ()), *literature),
+        comparison=contents.get("comparison"),
+        torsional=contents.get("torsional"),
     )
 
 
