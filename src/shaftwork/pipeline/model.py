@@ -138,8 +138,7 @@ class Model(CompiledModel):
             SimulationError: the integration failed; says when, in which state and why.
             MissingExtraError: the engine asked for is not installed.
         """
-        if angles:
-            refuse_unrecorded(self.form, as_names(angles))
+        refuse_unrecorded(self.form, as_names(angles))
         values = self._checked_all(parameters)
         if isinstance(initial, Solution):
             initial = ending_of(initial, self.form.graph)
