@@ -24,6 +24,7 @@ from shaftwork.pipeline.model import Model
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
+    from shaftwork.analogues.analogue import Analogue
     from shaftwork.drawing.canvas import Drawing
     from shaftwork.frequency.analysis import SmallMotions
     from shaftwork.frequency.campbell import Campbell
@@ -237,6 +238,20 @@ class Network(NetworkBuilder):
         from shaftwork.frequency.exact_networks import small_motions
 
         return small_motions(model, Compiler((), LOOP), every=exact)
+
+    def circuit(self) -> Analogue:
+        """The analogue circuit, force-current: inertias are capacitors, springs inductors, dampers resistors.
+
+        Sources are sources, gears transformers. What has no such element (brakes, gaps, motors with modes, long shafts)
+        is a part with its laws between nodes of the circuit; parts of circuits stay as they are. It is simulated to the
+        same numbers, and `Analogue.quantities` tells their names.
+
+        Raises:
+            NetworkError: the network cannot be assembled; lists every reason.
+        """
+        from shaftwork.analogues.circuit import circuit
+
+        return circuit(self, _sound(self.netlist()))
 
     def draw(
         self,
