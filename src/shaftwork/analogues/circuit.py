@@ -26,7 +26,7 @@ from shaftwork.core.domains import ELECTRICAL
 from shaftwork.formulation.form import Names, StateForm, integral_name, state_form
 from shaftwork.network.graph import CircuitGraph, GraphPart, build_graph
 from shaftwork.network.kinds import Kind
-from shaftwork.network.netlist import Netlist, Placed
+from shaftwork.network.netlist import REFERENCE, Netlist, Placed
 from shaftwork.pipeline.network import Network
 
 READ = {ACROSS: u, INTEGRAL: psi, **IN_LAWS}
@@ -68,7 +68,8 @@ class _Circuit:
             return
         self._renamed.append(part)
         electrical = image_class(type(component)) is type(component)
-        yield item if electrical else dataclasses.replace(item, part=image_of(component), origin=None)
+        nodes = (*item.nodes, *(REFERENCE for _ in component.ports[len(item.nodes) :]))
+        yield item if electrical else dataclasses.replace(item, part=image_of(component), nodes=nodes, origin=None)
 
     def _is_elementary(self, part: GraphPart) -> bool:
         """Whether elements of a circuit can stand for a part: one that is no circuit itself and no mesh."""

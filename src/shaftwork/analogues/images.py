@@ -40,6 +40,10 @@ IN_UNITS = {
 """Units of parameters, and what they are in a circuit; others, such as lengths and shares, stay."""
 
 
+SAME = {"Freewheel": "Diode"}
+"""Classes whose image is a part of circuits that exists."""
+
+
 def in_circuit(quantity: str) -> str:
     """The name of a quantity of a part or node in a circuit: u for omega, i_a for tau_a, psi for phi."""
     letter, *rest = quantity.split("_", 1)
@@ -63,15 +67,24 @@ def image_class(kind: type[Component]) -> type[Component]:
     """The class of parts of a circuit that have the laws of a class; that itself where all its ports are electrical."""
     if all(port.domain in (ELECTRICAL, None) for port in kind.ports):
         return kind
+    if kind.__name__ in SAME:
+        return REGISTRY[SAME[kind.__name__]]
 
     def inner_ports(self: Component) -> tuple[Port, ...]:
         return _moved(kind.inner_ports(self))
 
     def signals(self: Component) -> dict[str, Signal]:
-        return {
-            in_circuit(name): signal if signal.domain is None else dataclasses.replace(signal, domain=ELECTRICAL)
-            for name, signal in kind.signals(self).items()
-        }
+        mechanical = kind.signals(self)
+        renamed: dict[str, Signal] = {}
+        for name, signal in mechanical.items():
+            if signal.domain in (ELECTRICAL, None):
+                renamed[name] = signal
+                continue
+            other = in_circuit(name)  # the current of a machine's rotor is not that of its winding
+            renamed[f"{other}_{signal.ends[0]}" if other in mechanical else other] = dataclasses.replace(
+                signal, domain=ELECTRICAL
+            )
+        return renamed
 
     def profiles(self: Component) -> dict[str, Profile]:
         items = kind.profiles(self).items()

@@ -37,12 +37,12 @@ class Readings:
     Args:
         form: the state form of the network.
         edges: what is read of each edge.
-        nodes: the across variable of each node, where the analogue has one; by default that along a path to the frame.
+        nodes: the across variable of each node.
     """
 
     def __init__(self, form: StateForm, edges: Mapping[Edge, EdgeReading], nodes: Mapping[int, Sum]) -> None:
         self._form, self._graph, self._edges = form, form.graph, edges
-        self._nodes = {GROUND: {}, **(nodes or _along_paths(form.graph, edges))}
+        self._nodes = {GROUND: {}, **nodes}
 
     def quantities(self) -> dict[str, Sum]:
         """A sum for each quantity of parts and nodes, and each state."""
@@ -101,7 +101,7 @@ class Readings:
         return None
 
 
-def _along_paths(graph: CircuitGraph, edges: Mapping[Edge, EdgeReading]) -> dict[int, Sum]:
+def sums_of_nodes(graph: CircuitGraph, edges: Mapping[Edge, EdgeReading]) -> dict[int, Sum]:
     """What is across each node and the frame, summed along a path of edges; nodes without such a path are left out."""
     ends = {key: (plus, minus) for branch in graph.branches for key, plus, minus in ends_of(branch) if key in edges}
     paths: nx.MultiGraph[int] = nx.MultiGraph()

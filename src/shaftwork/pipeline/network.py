@@ -253,6 +253,22 @@ class Network(NetworkBuilder):
 
         return circuit(self, _sound(self.netlist()))
 
+    def dual(self) -> Analogue:
+        """The dual circuit, force-voltage: inertias are inductors, springs capacitors, what is in parallel is in series.
+
+        Its voltages are torques and its currents speeds. Its nodes are the meshes of the graph, which must be planar;
+        long shafts are written out first. `Analogue.quantities` tells names. Source: Popenda 2019, (5)-(7).
+
+        Raises:
+            NetworkError: the network cannot be assembled, a part has no dual, or the graph is not planar; lists every
+                reason.
+            ParameterError: a shaft's model is no chain of springs, as `Lumped` is.
+        """
+        from shaftwork.analogues.dual import dual
+
+        network = self.expanded()
+        return dual(network, _sound(network.netlist()))
+
     def draw(
         self,
         *,
