@@ -24,16 +24,24 @@ class Analogue(Network):
         original: the network that it is the analogue of.
         quantities: by name of a quantity of the original the sum that it is, as factors by names of quantities of this
             one: {"J1.omega": {"J1.u": 1.0}, "shaft.tau": {"shaft.i": 1.0, "shaft d.i": 1.0}}.
+        branches: by name of a part the branch of the graph of the original that it stands for.
     """
 
     original: Network
     quantities: Mapping[str, Mapping[str, float]]
+    branches: Mapping[str, int]
 
     @classmethod
-    def made(cls, netlist: Netlist, original: Network, quantities: Mapping[str, Mapping[str, float]]) -> Self:
+    def made(
+        cls,
+        netlist: Netlist,
+        original: Network,
+        quantities: Mapping[str, Mapping[str, float]],
+        branches: Mapping[str, int],
+    ) -> Self:
         """The analogue of a network, from its parts."""
         analogue = cls._of(netlist)
-        analogue.original, analogue.quantities = original, quantities
+        analogue.original, analogue.quantities, analogue.branches = original, quantities, branches
         return analogue
 
     def read(self, solution: Solution, name: str) -> NDArray[np.float64]:

@@ -46,7 +46,7 @@ def circuit(network: Network, form: StateForm) -> Analogue:
     for item, part in zip(netlist.placed, form.graph.parts, strict=True):
         placed += work.placed(item, part)
     changed = dataclasses.replace(netlist, name=f"circuit of {netlist.name}", placed=tuple(placed))
-    return Analogue.made(changed, network, work.quantities())
+    return Analogue.made(changed, network, work.quantities(), work.branches)
 
 
 class _Circuit:
@@ -57,6 +57,7 @@ class _Circuit:
         self._names = ElementNames(form.graph)
         self._edges: dict[Edge, EdgeReading] = {}
         self._renamed: list[GraphPart] = []
+        self.branches: dict[str, int] = {}
 
     def placed(self, item: Placed, part: GraphPart) -> Iterator[Placed]:
         """The parts that a part is in the circuit."""
@@ -98,6 +99,7 @@ class _Circuit:
                 declared.magnitude(getattr(made, name))[1] is None for name, declared in made.declared.items()
             )
             yield (made if acceptable else None), tuple(node for ends in element.ends for node in ends)
+            self.branches[element.name] = element.edges[0][0]
             for edge, reading in zip(element.edges, _readings(element), strict=True):
                 self._edges[edge] = reading
 

@@ -62,7 +62,7 @@ def dual(network: Network, form: StateForm) -> Analogue:
     placed = [item for element in elements for item in work.placed(element)]
     netlist = network.netlist()
     changed = dataclasses.replace(netlist, name=f"dual of {netlist.name}", placed=tuple(placed), ports=())
-    return Analogue.made(changed, network, _quantities(form, elements, joints, work.edges))
+    return Analogue.made(changed, network, _quantities(form, elements, joints, work.edges), work.branches)
 
 
 def _quantities(
@@ -132,6 +132,7 @@ class _Dual:
     def __init__(self, faces: DualEnds) -> None:
         self._faces = faces
         self.edges: dict[Edge, EdgeReading] = {}
+        self.branches: dict[str, int] = {}
 
     def placed(self, element: Element) -> Iterator[Placed]:
         """The parts that are the dual of an element."""
@@ -143,6 +144,7 @@ class _Dual:
             is_source = element.kind in (Kind.ACROSS_SOURCE, Kind.THROUGH_SOURCE)
             yield Placed(_made(element), (right, left) if is_source else (left, right))
             name, sign = element.name, -1.0 if is_source else 1.0
+            self.branches[name] = edge[0]
             self.edges[edge] = EdgeReading({f"{name}.i": 1.0}, {f"{name}.u": sign})
         for edge in element.edges:
             if edge in self._faces.bridges:
@@ -160,6 +162,7 @@ class _Dual:
             return
         (first, base), *others = sides
         names = [element.name if len(others) == 1 else f"{element.name} {number}" for number in range(1, len(sides))]
+        self.branches |= dict.fromkeys(names, first[0])
         for name, (edge, factor) in zip(names, others, strict=True):
             sign = 1.0 if base / factor > 0 else -1.0
             ends = self._nodes(edge)[:: int(sign)]
