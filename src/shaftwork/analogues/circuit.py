@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Iterator
 from typing import Any
 
-from shaftwork.analogues.analogue import Analogue
+from shaftwork.analogues.analogy import Analogy
 from shaftwork.analogues.elements import Edge, Element, ElementNames, Sum, elements_of, is_linear
 from shaftwork.analogues.images import IN_LAWS, image_class, image_of, in_circuit
 from shaftwork.analogues.readings import EdgeReading, Readings
@@ -22,31 +22,30 @@ from shaftwork.components.electrical import (
 )
 from shaftwork.components.laws import psi, replaced, u
 from shaftwork.components.modes import ModeChoice
-from shaftwork.core.domains import ELECTRICAL
+from shaftwork.core.domains import ELECTRICAL, ROTATION, Domain
 from shaftwork.formulation.form import Names, StateForm, integral_name, state_form
 from shaftwork.network.graph import CircuitGraph, GraphPart, build_graph
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
-from shaftwork.pipeline.network import Network
 
 READ = {ACROSS: u, INTEGRAL: psi, **IN_LAWS}
 """What laws of branches read, in quantities of a circuit."""
 
 
-def circuit(network: Network, form: StateForm) -> Analogue:
+def circuit(netlist: Netlist, form: StateForm) -> Analogy:
     """The circuit of a network: `Network.circuit` says of what.
 
     Args:
-        network: the network.
+        netlist: of the network.
         form: its state form.
     """
-    netlist = network.netlist()
     work = _Circuit(netlist, form)
     placed: list[Placed] = []
     for item, part in zip(netlist.placed, form.graph.parts, strict=True):
         placed += work.placed(item, part)
     changed = dataclasses.replace(netlist, name=f"circuit of {netlist.name}", placed=tuple(placed))
-    return Analogue.made(changed, network, work.quantities(), work.branches)
+    domains = {name: domain for name, domain in work.domains() if domain is not ROTATION}
+    return Analogy(netlist.name, changed, work.quantities(), work.branches, domains)
 
 
 class _Circuit:
@@ -103,6 +102,11 @@ class _Circuit:
             for edge, reading in zip(element.edges, _readings(element), strict=True):
                 self._edges[edge] = reading
 
+    def domains(self) -> Iterator[tuple[str, Domain]]:
+        """The nodes of the circuit, and their domains in the network."""
+        for number, domain in enumerate(self._graph.domains):
+            yield self._names.node(number), domain
+
     def quantities(self) -> dict[str, Sum]:
         """What each quantity of the network is in the circuit."""
         names = Names(self._form)
@@ -152,22 +156,22 @@ def _names_in_circuit(part: Component) -> dict[str, str]:
 
 def _made(element: Element) -> Component | None:
     """The part of a circuit that an element is."""
-    name, value = element.name, element.value
+    name, symbol, value = element.name, element.symbol, element.value
     match element.kind:
         case Kind.ACROSS_STORE:
-            return Capacitor(name, C=value)
+            return Capacitor(name, symbol=symbol, C=value)
         case Kind.THROUGH_STORE:
-            return Inductor(name, L=1 / value)
+            return Inductor(name, symbol=symbol, L=1 / value)
         case Kind.CONDUCTANCE:
-            return Resistor(name, R=1 / value)
+            return Resistor(name, symbol=symbol, R=1 / value)
         case Kind.ACROSS_SOURCE:
-            return VoltageSource(name, u=_in_circuit(value))
+            return VoltageSource(name, symbol=symbol, u=_in_circuit(value))
         case Kind.THROUGH_SOURCE | Kind.LAW:
-            return CurrentSource(name, i=-_in_circuit(value))
+            return CurrentSource(name, symbol=symbol, i=-_in_circuit(value))
         case Kind.COUPLING if len(element.terms) == 2:
-            return Transformer(name, ratio=-element.terms[1] / element.terms[0])
+            return Transformer(name, symbol=symbol, ratio=-element.terms[1] / element.terms[0])
         case _:
-            return Resistor(name, R=0.0)
+            return Resistor(name, symbol=symbol, R=0.0)
 
 
 def _in_circuit(value: Any) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Sequence
 
-from shaftwork.analogues.analogue import Analogue
+from shaftwork.analogues.analogy import Analogy
 from shaftwork.analogues.elements import Edge, Element, ElementNames, Sum, elements_of, is_linear
 from shaftwork.analogues.faces import DualEnds, Kuratowski, dual_ends
 from shaftwork.analogues.readings import EdgeReading, Readings, sums_of_nodes, total
@@ -23,24 +23,23 @@ from shaftwork.core.errors import Diagnostic, NetworkError
 from shaftwork.formulation.form import StateForm
 from shaftwork.network.graph import CircuitGraph, GraphPart, ends_of
 from shaftwork.network.kinds import Kind
-from shaftwork.network.netlist import REFERENCE, Placed, listed, title
-from shaftwork.pipeline.network import Network
+from shaftwork.network.netlist import REFERENCE, Netlist, Placed, listed, title
 
 OTHERWISE = "Take net.circuit(), which every network has"
 
 
-def dual(network: Network, form: StateForm) -> Analogue:
+def dual(netlist: Netlist, form: StateForm) -> Analogy:
     """The dual of a network: `Network.dual` says of what.
 
     Args:
-        network: the network.
+        netlist: of the network.
         form: its state form.
 
     Raises:
         NetworkError: a part has no dual, or the graph is not planar.
     """
     graph = form.graph
-    title_of_error = f"'{network.name}' has no dual"
+    title_of_error = f"'{netlist.name}' has no dual"
     if problems := tuple(_without_dual(part, graph) for part in graph.parts if not is_linear(part, graph)):
         raise NetworkError(title_of_error, problems)
     names = ElementNames(graph)
@@ -60,9 +59,8 @@ def dual(network: Network, form: StateForm) -> Analogue:
         raise NetworkError(title_of_error, (_not_planar(faces, graph),))
     work = _Dual(faces)
     placed = [item for element in elements for item in work.placed(element)]
-    netlist = network.netlist()
     changed = dataclasses.replace(netlist, name=f"dual of {netlist.name}", placed=tuple(placed), ports=())
-    return Analogue.made(changed, network, _quantities(form, elements, joints, work.edges), work.branches)
+    return Analogy(netlist.name, changed, _quantities(form, elements, joints, work.edges), work.branches)
 
 
 def _quantities(
@@ -166,7 +164,9 @@ class _Dual:
         for name, (edge, factor) in zip(names, others, strict=True):
             sign = 1.0 if base / factor > 0 else -1.0
             ends = self._nodes(edge)[:: int(sign)]
-            yield Placed(Transformer(name, ratio=abs(base / factor)), (*self._nodes(first), *ends))
+            yield Placed(
+                Transformer(name, symbol=element.symbol, ratio=abs(base / factor)), (*self._nodes(first), *ends)
+            )
             self.edges[edge] = EdgeReading({f"{name}.i_2": sign}, {f"{name}.u_2": sign})
         currents = total(*((1.0, {f"{name}.i_1": 1.0}) for name in names))
         self.edges[first] = EdgeReading(currents, {f"{names[0]}.u_1": 1.0})
@@ -182,15 +182,15 @@ def _node(face: int) -> str:
 
 def _made(element: Element) -> Component:
     """The dual of a store, a loss or a source."""
-    name, value = element.name, element.value
+    name, symbol, value = element.name, element.symbol, element.value
     match element.kind:
         case Kind.ACROSS_STORE:
-            return Inductor(name, L=value)
+            return Inductor(name, symbol=symbol, L=value)
         case Kind.THROUGH_STORE:
-            return Capacitor(name, C=1 / value)
+            return Capacitor(name, symbol=symbol, C=1 / value)
         case Kind.CONDUCTANCE:
-            return Resistor(name, R=value)
+            return Resistor(name, symbol=symbol, R=value)
         case Kind.ACROSS_SOURCE:
-            return CurrentSource(name, i=value)
+            return CurrentSource(name, symbol=symbol, i=value)
         case _:
-            return VoltageSource(name, u=-value)
+            return VoltageSource(name, symbol=symbol, u=-value)

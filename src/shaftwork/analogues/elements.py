@@ -25,6 +25,7 @@ class Element:
 
     Args:
         name: of the part that is made of it; that of its own part, where this has no other element.
+        symbol: of its own part, where it has the name of that.
         kind: what its law is.
         value: capacity, stiffness or conductance; of a law or source the number or expression of what
             passes, or is across.
@@ -34,6 +35,7 @@ class Element:
     """
 
     name: str
+    symbol: str | None
     kind: Kind
     value: Any
     terms: tuple[float, ...]
@@ -102,7 +104,8 @@ def elements_of(part: GraphPart, graph: CircuitGraph, names: ElementNames) -> It
         factors = tuple(float(in_numbers(factor, branch, graph)) for factor, _, _ in branch.terms) or (1.0,)
         law = in_numbers(branch.template.law, branch, graph)
         value = float(law) if law.is_number else law
-        yield Element(name, branch.template.kind, value, factors, tuple(keys), tuple(ends))
+        symbol = part.component.symbol if name == part.name else None
+        yield Element(name, symbol, branch.template.kind, value, factors, tuple(keys), tuple(ends))
 
 
 FIRST = (Kind.COUPLING, Kind.ACROSS_SOURCE, Kind.THROUGH_SOURCE)

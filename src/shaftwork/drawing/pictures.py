@@ -5,43 +5,61 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from shaftwork.core.errors import ParameterError
 from shaftwork.drawing.canvas import Drawing, drawn
 from shaftwork.drawing.items import End, Item, Letters, circuit_items, train_items
 from shaftwork.drawing.symbols import CIRCUIT
-from shaftwork.equations.records import NamedPhase
+from shaftwork.equations.records import Equations, NamedPhase
 from shaftwork.network.graph import GROUND, CircuitGraph
 
-if TYPE_CHECKING:
-    from shaftwork.pipeline.network import Network
 
+def refuse_analogy(analogy: str, *, as_circuit: bool) -> None:
+    """Refuse what is no analogy, or one of circuits for the picture of a drive train.
 
-def drawing_of(
-    network: Network, *, as_circuit: bool, analogy: str, values: bool, expand: bool, phase: str | NamedPhase | None
-) -> Drawing:
-    """The drawing of a network; arguments and errors as of `Network.draw`."""
+    Raises:
+        ParameterError: it is so.
+    """
     if analogy not in ("force-current", "force-voltage"):
         raise ParameterError(f"analogy = {analogy!r} must be 'force-current' or 'force-voltage'.")
-    if analogy == "force-current":
-        equations = network.equations(expand=expand, phase=phase)
-        graph, items = equations.form.graph, circuit_items if as_circuit else train_items
-        modes = {} if phase is None else _modes_in(network, phase)
-        return drawn(graph, tuple(items(Letters(graph, equations.symbol_names, values, modes))), train=not as_circuit)
-    if not as_circuit:
-        raise ParameterError("analogy='force-voltage' is one of circuits. Write draw(as_circuit=True, analogy=...).")
-    dual = network.dual()
-    equations, graph = dual.original.equations(phase=phase), dual.graph()
+    if analogy == "force-voltage" and not as_circuit:
+        raise ParameterError(f"analogy = {analogy!r} is one of circuits. Write draw(as_circuit=True, analogy=...).")
+
+
+def picture(
+    equations: Equations, in_phase: tuple[CircuitGraph, str | NamedPhase] | None, *, as_circuit: bool, values: bool
+) -> Drawing:
+    """A drive train or its circuit.
+
+    Args:
+        equations: of the network.
+        in_phase: where a phase is drawn, the graph of the network and the phase.
+        as_circuit: whether it is drawn as a circuit.
+        values: whether the values of parameters are written.
+    """
+    modes = {} if in_phase is None else _words_of_modes(*in_phase)
+    graph, items = equations.form.graph, circuit_items if as_circuit else train_items
+    return drawn(graph, tuple(items(Letters(graph, equations.symbol_names, values, modes))), train=not as_circuit)
+
+
+def dual_picture(equations: Equations, dual: CircuitGraph, branches: Mapping[str, int], values: bool) -> Drawing:  # noqa: FBT001
+    """The dual circuit with the letters of the drive train.
+
+    Args:
+        equations: of the network.
+        dual: the graph of its dual.
+        branches: by name of a part of the dual the branch of the network that it is the dual of.
+        values: whether the values of parameters are written.
+    """
     letters = Letters(equations.form.graph, equations.symbol_names, values, {})
-    return drawn(graph, tuple(_dual_items(letters, graph, dual.branches)), train=False)
+    return drawn(dual, tuple(_dual_items(letters, dual, branches)), train=False)
 
 
-def _modes_in(network: Network, phase: str | NamedPhase) -> dict[str, str]:
+def _words_of_modes(graph: CircuitGraph, phase: str | NamedPhase) -> dict[str, str]:
     """The mode of every part that changes its, in words."""
     from shaftwork.hybrid.named_phases import words_of, words_of_modes
 
-    return words_of_modes(network.graph(), words_of(phase))
+    return words_of_modes(graph, words_of(phase))
 
 
 def _dual_items(letters: Letters, dual: CircuitGraph, branches: Mapping[str, int]) -> Iterator[Item]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import reprlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self
 
@@ -20,7 +20,8 @@ from shaftwork.pipeline.model import Model
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
-    from shaftwork.analogues.analogue import Analogue
+    from shaftwork.analogues.analogy import Analogy
+    from shaftwork.core.domains import Domain
     from shaftwork.drawing.canvas import Drawing
     from shaftwork.frequency.analysis import SmallMotions
     from shaftwork.frequency.campbell import Campbell
@@ -47,6 +48,9 @@ class Network(NetworkBuilder):
         >>> round(float(net.simulate(t_end=1.0)["J1.omega"][-1]), 2)
         2.0
     """
+
+    analogy: Analogy | None = None
+    """Of a network that `circuit` or `dual` made, what the quantities of the first network are in it."""
 
     def check(self) -> tuple[Diagnostic, ...]:
         """Everything that is wrong with the network or worth saying about it. Never raises."""
@@ -235,25 +239,42 @@ class Network(NetworkBuilder):
 
         return small_motions(model, Compiler((), LOOP), every=exact)
 
-    def circuit(self) -> Analogue:
+    def circuit(self) -> Network:
         """The analogue circuit, force-current: inertias are capacitors, springs inductors, dampers resistors.
 
         Sources are sources, gears transformers. What has no such element (brakes, gaps, motors with modes, long shafts)
         is a part with its laws between nodes of the circuit; parts of circuits stay as they are. It is simulated to the
-        same numbers, and `Analogue.quantities` tells their names.
+        same numbers, and `circuit.analogy` tells their names.
 
         Raises:
             NetworkError: the network cannot be assembled; lists every reason.
         """
         from shaftwork.analogues.circuit import circuit
 
-        return circuit(self, sound(self.netlist()))
+        return self._of_analogy(circuit(self.netlist(), sound(self.netlist())))
 
-    def dual(self) -> Analogue:
+    def mechanical(self, domains: Mapping[str, Domain] | None = None) -> Network:
+        """The drive train of which the network is the circuit: capacitors are inertias, inductors springs, and so on.
+
+        Args:
+            domains: of nodes that do not rotate, {"rope": TRANSLATION}; what is all ELECTRICAL stays as it is. What
+                `circuit` made knows them.
+
+        Raises:
+            NetworkError: the network cannot be assembled, or a part has no counterpart, as a capacitor between two
+                nodes; lists every reason.
+        """
+        from shaftwork.analogues.mechanical import mechanical
+
+        sound(self.netlist())
+        known = {} if self.analogy is None else self.analogy.domains
+        return Network._of(mechanical(self.netlist(), {**known, **(domains or {})}))
+
+    def dual(self) -> Network:
         """The dual circuit, force-voltage: inertias are inductors, springs capacitors, parallel is in series.
 
         Its voltages are torques and its currents speeds. Its nodes are the meshes of the graph, which must be planar;
-        long shafts are written out first. `Analogue.quantities` tells names. Source: Popenda 2019, (5)-(7).
+        long shafts are written out first. `dual.analogy` tells names. Source: Popenda 2019, (5)-(7).
 
         Raises:
             NetworkError: the network cannot be assembled, a part has no dual, or the graph is not planar; lists every
@@ -262,8 +283,14 @@ class Network(NetworkBuilder):
         """
         from shaftwork.analogues.dual import dual
 
-        network = self.expanded()
-        return dual(network, sound(network.netlist()))
+        netlist = self.expanded().netlist()
+        return self._of_analogy(dual(netlist, sound(netlist)))
+
+    @staticmethod
+    def _of_analogy(analogy: Analogy) -> Network:
+        network = Network._of(analogy.netlist)
+        network.analogy = analogy
+        return network
 
     def draw(
         self,
@@ -290,9 +317,15 @@ class Network(NetworkBuilder):
             ParameterError: as for `equations`.
             MissingExtraError: matplotlib is not installed.
         """
-        from shaftwork.drawing.pictures import drawing_of
+        from shaftwork.drawing.pictures import dual_picture, picture, refuse_analogy
 
-        return drawing_of(self, as_circuit=as_circuit, analogy=analogy, values=values, expand=expand, phase=phase)
+        refuse_analogy(analogy, as_circuit=as_circuit)
+        if analogy == "force-voltage":
+            dual, equations = self.dual(), self.equations(expand=True, phase=phase)
+            return dual_picture(equations, dual.graph(), {} if dual.analogy is None else dual.analogy.branches, values)
+        equations = self.equations(expand=expand, phase=phase)
+        in_phase = None if phase is None else (self.graph(), phase)
+        return picture(equations, in_phase, as_circuit=as_circuit, values=values)
 
     def _repr_html_(self) -> str | None:
         """What a notebook shows; nothing but the text where the network cannot be drawn, or is too large to be read."""
