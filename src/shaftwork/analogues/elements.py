@@ -116,4 +116,4 @@ def in_numbers(law: Expr, branch: GraphBranch, graph: CircuitGraph) -> Expr:
     """A law with the values of its parameters."""
     owner = graph.parts[branch.part].name
     values = {symbol: Float(graph.parameters[f"{owner}.{symbol.name}"]) for symbol in branch.template.symbols}
-    return replaced(law, values)  # type: ignore[no-any-return]
+    return replaced(law, values)

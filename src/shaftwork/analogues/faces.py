@@ -9,7 +9,7 @@ import networkx as nx
 
 from shaftwork.analogues.elements import Edge
 
-Vertex = tuple[str, object]
+Vertex = int | Edge
 """A node of the graph, or the middle of an edge: edges between the same nodes are then told apart."""
 
 
@@ -54,7 +54,7 @@ def dual_ends(edges: Mapping[Edge, tuple[int, int]], near_reference: Sequence[Ed
     """
     graph: nx.Graph[Vertex] = nx.Graph()
     for key, (plus, minus) in edges.items():
-        graph.add_edges_from(((("node", plus), ("edge", key)), (("edge", key), ("node", minus))))
+        graph.add_edges_from(((plus, key), (key, minus)))
     is_planar, certificate = nx.check_planarity(graph, counterexample=True)
     if not is_planar:
         return _kuratowski(certificate)
@@ -70,9 +70,9 @@ def dual_ends(edges: Mapping[Edge, tuple[int, int]], near_reference: Sequence[Ed
 
 
 def _kuratowski(subgraph: nx.Graph[Vertex]) -> Kuratowski:
-    branching = tuple(int(str(name)) for kind, name in subgraph if kind == "node" and subgraph.degree((kind, name)) > 2)
-    edges = tuple(name for kind, name in subgraph if kind == "edge")
-    return Kuratowski("K5" if len(branching) == 5 else "K3,3", branching, edges)  # type: ignore[arg-type]
+    branching = tuple(node for node in subgraph if isinstance(node, int) and subgraph.degree(node) > 2)
+    edges = tuple(vertex for vertex in subgraph if isinstance(vertex, tuple))
+    return Kuratowski("K5" if len(branching) == 5 else "K3,3", branching, edges)
 
 
 class _Blocks:
@@ -85,17 +85,19 @@ class _Blocks:
         self.bridges: dict[Edge, None] = {}
 
     def add(self, block: Sequence[tuple[Vertex, Vertex]]) -> None:
-        """Take the faces of a block; half an edge alone is a bridge, which gets a face of its own."""
-        halves = sorted(block, key=str)
-        keys = list(dict.fromkeys(name for half in halves for kind, name in half if kind == "edge"))
-        if len(halves) == 1:
+        """Take the faces of a block; half an edge alone is a bridge, which gets a face of its own.
+
+        An edge has on its right the face on the right of its first half, and on its left that of the way back.
+        """
+        keys = list(dict.fromkeys(sorted(end for half in block for end in half if isinstance(end, tuple))))
+        if len(block) == 1:
             (key,) = keys
             if key not in self.bridges:  # both of its halves are blocks
                 self._count += 1
-                self.ends[key], self.bridges[key] = (self._count, 0), None  # type: ignore[index, assignment]
+                self.ends[key], self.bridges[key] = (self._count, 0), None
             return
-        faces = _faces(halves)
-        sides = {key: self._sides(key, faces) for key in sorted(keys)}  # type: ignore[type-var, arg-type]
+        faces = _faces([half for key in keys for half in ((self._edges[key][0], key), (key, self._edges[key][1]))])
+        sides = {key: (faces[key, self._edges[key][0]], faces[self._edges[key][0], key]) for key in keys}
         reference = self._reference(sides)
         begin = sum((left == reference) - (right == reference) for left, right in sides.values())
         numbers: dict[int, int] = {reference: 0}
@@ -106,11 +108,6 @@ class _Blocks:
                     numbers[face] = self._count
             left, right = (numbers[face] for face in pair)
             self.ends[key] = (right, left) if begin > 0 else (left, right)
-
-    def _sides(self, key: Edge, faces: Mapping[tuple[Vertex, Vertex], int]) -> tuple[int, int]:
-        """The faces on the left and on the right of an edge."""
-        start, middle = ("node", self._edges[key][0]), ("edge", key)
-        return faces[middle, start], faces[start, middle]
 
     def _reference(self, sides: Mapping[Edge, tuple[int, int]]) -> int:
         ranks: dict[int, list[int]] = {}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from functools import cache
 from types import MappingProxyType
 from typing import Any
 
@@ -62,9 +61,18 @@ def image_values(part: Component) -> dict[str, Any]:
     return {name: value.xreplace(IN_LAWS) if isinstance(value, Expr) else value for name, value in values.items()}
 
 
-@cache
+IMAGES: dict[type[Component], type[Component]] = {}
+"""Images that have been made: one for each class."""
+
+
 def image_class(kind: type[Component]) -> type[Component]:
     """The class of parts of a circuit that have the laws of a class; that itself where all its ports are electrical."""
+    if kind not in IMAGES:
+        IMAGES[kind] = _image_class(kind)
+    return IMAGES[kind]
+
+
+def _image_class(kind: type[Component]) -> type[Component]:
     if all(port.domain in (ELECTRICAL, None) for port in kind.ports):
         return kind
     if kind.__name__ in SAME:

@@ -164,7 +164,8 @@ def _joined(placed: list[Placed]) -> Iterator[Placed]:
     inside: dict[str, Placed] = {}
     for item in placed:
         beside = dampers.get(f"{item.part.name} d")
-        if isinstance(item.part, Spring | TranslationalSpring) and beside is not None and beside.nodes == item.nodes:
+        is_spring = isinstance(item.part, Spring | TranslationalSpring)
+        if is_spring and beside is not None and _free(beside.nodes) == _free(item.nodes):
             inside[beside.part.name] = beside
     for item in placed:
         if (beside := inside.get(f"{item.part.name} d")) is not None and item.part.name not in inside:
