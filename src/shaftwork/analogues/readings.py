@@ -9,6 +9,7 @@ import networkx as nx
 
 from shaftwork.analogues.elements import Edge, Sum, in_numbers
 from shaftwork.components.base import Signal
+from shaftwork.components.branches import End
 from shaftwork.formulation.form import Names, StateForm, store_name
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart, ends_of
 from shaftwork.network.kinds import Kind
@@ -70,7 +71,7 @@ class Readings:
                 return None
             return total((signal.sign, self._nodes[first]), (-signal.sign, self._nodes[second]))
         if signal.kind == "through":
-            return self._through(part, first, signal.sign)
+            return self._through(part, signal.ends[0], signal.sign)
         return self._of_store(part, signal)
 
     def _between(self, part: GraphPart, first: int, second: int) -> EdgeReading | None:
@@ -81,12 +82,15 @@ class Readings:
                     return self._edges[key]
         return None
 
-    def _through(self, part: GraphPart, node: int, sign: float) -> Sum:
-        """What a node gives to a part."""
+    def _through(self, part: GraphPart, port: End, sign: float) -> Sum:
+        """What the node at a port gives to a part there."""
         terms: list[tuple[float, Sum]] = []
         for index in part.branches:
-            for key, plus, minus in ends_of(self._graph.branches[index]):
-                terms += [(sign * ((plus == node) - (minus == node)), self._edges[key].through)]
+            template = self._graph.branches[index].template
+            places = [pair for _, *pair in template.terms] or [template.ends]
+            for number, (plus, minus) in enumerate(places):
+                share = sign * ((plus == port) - (minus == port))
+                terms.append((share, self._edges[index, number].through))
         return total(*terms)
 
     def _of_store(self, part: GraphPart, signal: Signal) -> Sum | None:
