@@ -23,6 +23,7 @@ USES = {
     "reduce": "sw.reduce.refer(net, 'wheel')",
     "sizing": "sw.sizing.duty",
     "drawing": "net.draw()",
+    "analogues": "net.circuit().simulate(0.1)",
     "studies": "sw.studies.work_precision",
 }
 """By feature, something small that takes it."""
