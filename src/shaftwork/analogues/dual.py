@@ -28,6 +28,17 @@ from shaftwork.network.netlist import REFERENCE, Netlist, Placed, listed, title
 OTHERWISE = "Take net.circuit(), which every network has"
 
 
+RANKS = {
+    Kind.THROUGH_STORE: 0,
+    Kind.COUPLING: 1,
+    Kind.ACROSS_SOURCE: 2,
+    Kind.THROUGH_SOURCE: 2,
+    Kind.CONDUCTANCE: 3,
+    Kind.ACROSS_STORE: 4,
+}
+"""What is in series in the dual, from the reference on: springs are drawn across, inertias along the line."""
+
+
 def dual(netlist: Netlist, form: StateForm) -> Analogy:
     """The dual of a network: `Network.dual` says of what.
 
@@ -52,9 +63,8 @@ def dual(netlist: Netlist, form: StateForm) -> Analogy:
     ]
     ends = {key: (plus, minus) for branch in graph.branches for key, plus, minus in ends_of(branch)}
     joints = RigidJoints(elements, ends)
-    springs = [element.edges[0] for element in elements if element.kind is Kind.THROUGH_STORE]
-    meshed = joints.free([edge for element in elements for edge in element.edges])
-    faces = dual_ends({edge: joints.nodes(edge) for edge in meshed}, springs)
+    ranks = {edge: RANKS[element.kind] for element in elements for edge in element.edges}
+    faces = dual_ends({edge: joints.nodes(edge) for edge in joints.free([*ranks])}, ranks)
     if isinstance(faces, Kuratowski):
         raise NetworkError(title_of_error, (_not_planar(faces, graph),))
     work = _Dual(faces)

@@ -87,7 +87,7 @@ class Readings:
         terms: list[tuple[float, Sum]] = []
         for index in part.branches:
             template = self._graph.branches[index].template
-            places = [pair for _, *pair in template.terms] or [template.ends]
+            places = [(plus, minus) for _, plus, minus in template.terms] or [template.ends]
             for number, (plus, minus) in enumerate(places):
                 share = sign * ((plus == port) - (minus == port))
                 terms.append((share, self._edges[index, number].through))
