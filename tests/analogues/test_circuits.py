@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -152,6 +153,12 @@ def test_a_capacitor_between_two_nodes_has_no_drive_train() -> None:
     net.add(sw.Resistor("R2", R=4.0), "b", "ground")
     with pytest.raises(sw.NetworkError, match=r"Capacitor 'C' stands between nodes 'a', 'b'.*Join one of its ends"):
         net.mechanical()
+
+
+def test_a_circuit_is_the_same_after_it_was_saved(tmp_path: Path) -> None:
+    circuit = sw.scenes.six_phases().circuit()
+    circuit.save(tmp_path / "circuit.toml")
+    assert sw.Network.load(tmp_path / "circuit.toml") == circuit
 
 
 def test_an_image_can_be_pickled() -> None:
