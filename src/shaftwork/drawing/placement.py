@@ -143,7 +143,7 @@ class _Placing:
         for each in column:
             begin = centre, foot[1] - LEAD
             row.result.leads[above].append((foot, begin))
-            above, foot = each.ends[1], (centre, begin[1] - LENGTH)
+            above, foot = each.ends[-1], (centre, begin[1] - LENGTH)
             mirrored = each.ends[0] == GROUND
             label = (label_x, begin[1] - LENGTH / 2)
             row.result.spots.append(Spot(each, begin, label, turned=True, mirrored=mirrored))
