@@ -83,7 +83,13 @@ def test_start_values_lead_to_the_same_motion() -> None:
     np.testing.assert_allclose(found["J2.u"], wanted["J2.omega"], rtol=1e-12)
 
 
-@pytest.mark.parametrize("name", registered())
+LONG = ("Shaft", "BucketWheelLoad", "BLDCMotor", "RandomLoad", "Rope", "FrequencyDrive", "PumpLoad")
+"""Parts whose equations take more than a second, twice."""
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG)) for name in registered()]
+)
 def test_the_circuit_of_every_part_moves_as_it_does(name: str) -> None:
     same_motion(bed_of(name))
 
@@ -103,6 +109,7 @@ def test_waves_travel_in_circuits_too() -> None:
     same_motion(net, np.linspace(0.0, 0.01, 5))
 
 
+@pytest.mark.slow
 def test_phases_and_events_of_a_circuit_are_those_of_the_train() -> None:
     net = sw.scenes.six_phases()
     wanted, found = net.simulate(1.0), net.circuit().simulate(1.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
+import pytest
 from hypothesis import given
 
 import shaftwork as sw
@@ -29,6 +30,7 @@ def assert_moves_alike(analogue: sw.Network, net: sw.Network, names: Iterable[st
     assert_equal_signals({name: analogue.analogy.read(solution, name) for name in wanted}, wanted, ROUNDING)
 
 
+@pytest.mark.slow
 @share_of_examples()
 @given(networks())
 def test_a_circuit_moves_like_its_network(pieces: Network) -> None:
@@ -38,6 +40,7 @@ def test_a_circuit_moves_like_its_network(pieces: Network) -> None:
     assert_moves_alike(circuit, net)
 
 
+@pytest.mark.slow
 @share_of_examples()
 @given(networks())
 def test_a_dual_moves_like_its_network_where_there_is_one(pieces: Network) -> None:
@@ -50,6 +53,7 @@ def test_a_dual_moves_like_its_network_where_there_is_one(pieces: Network) -> No
     assert_moves_alike(dual, net)
 
 
+@pytest.mark.slow
 @share_of_examples(0.5)
 @given(networks(max_inertias=12))
 def test_the_dual_of_a_dual_has_the_quantities_of_the_network(pieces: Network) -> None:
@@ -69,6 +73,7 @@ def test_the_dual_of_a_dual_has_the_quantities_of_the_network(pieces: Network) -
         assert stores.get(kind, 0) == sum(type(part).__name__ == kind for part in circuit.parts)
 
 
+@pytest.mark.slow
 @share_of_examples(0.5)
 @given(networks(max_inertias=12))
 def test_the_drive_train_of_a_circuit_is_what_it_was(pieces: Network) -> None:
