@@ -117,6 +117,15 @@ def test_all_parts_without_a_dual_are_named() -> None:
     assert all("net.circuit()" in problem.hint for problem in caught.value.problems)
 
 
+def test_a_torque_that_rises_with_the_speed_has_a_circuit_but_no_dual() -> None:
+    net = sw.Network("unstable")
+    net.add(sw.TorqueSource("motor", tau=1.0 + 0.5 * sw.omega), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    assert net.circuit().check() == ()
+    with pytest.raises(sw.NetworkError, match="TorqueSource 'motor': its torque rises with its speed"):
+        net.dual()
+
+
 def test_a_long_shaft_is_written_out() -> None:
     net = sw.scenes.shaft_step(model=sw.Lumped(4))
     dual = net.dual()

@@ -23,7 +23,7 @@ from shaftwork.components.electrical import (
 from shaftwork.components.laws import psi, replaced, u
 from shaftwork.components.modes import ModeChoice
 from shaftwork.core.domains import ELECTRICAL, ROTATION, Domain
-from shaftwork.formulation.form import Names, StateForm, integral_name, state_form
+from shaftwork.formulation.form import Names, StateForm, integral_name, state_form, store_name
 from shaftwork.network.graph import CircuitGraph, GraphPart, build_graph
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
@@ -61,10 +61,13 @@ class _Circuit:
     def placed(self, item: Placed, part: GraphPart) -> Iterator[Placed]:
         """The parts that a part is in the circuit."""
         component = item.part
-        parts = tuple(self._elementary(part)) if self._is_elementary(part) else ()
-        if parts and all(made is not None for made, _ in parts):
-            for made, nodes in parts:
-                yield Placed(made, nodes)
+        elements = tuple(elements_of(part, self._graph, self._names)) if self._is_elementary(part) else ()
+        elementary = [_made(element) for element in elements]
+        if elements and all(map(_is_admissible, elementary)):
+            for element, made in zip(elements, elementary, strict=True):
+                self.branches[element.name] = element.edges[0][0]
+                self._edges |= zip(element.edges, _readings(element), strict=True)
+                yield Placed(made, tuple(node for ends in element.ends for node in ends))
             return
         self._renamed.append(part)
         electrical = image_class(type(component)) is type(component)
@@ -90,18 +93,6 @@ class _Circuit:
             and not (part.modes or laws[0].reads or laws[0].conservative or laws[0].stored != 0)
         )
 
-    def _elementary(self, part: GraphPart) -> Iterator[tuple[Any, tuple[str, ...]]]:
-        """Elements of the circuit with their nodes; None in place of one whose value no such element may have."""
-        for element in elements_of(part, self._graph, self._names):
-            made = _made(element)
-            acceptable = made is not None and all(
-                declared.magnitude(getattr(made, name))[1] is None for name, declared in made.declared.items()
-            )
-            yield (made if acceptable else None), tuple(node for ends in element.ends for node in ends)
-            self.branches[element.name] = element.edges[0][0]
-            for edge, reading in zip(element.edges, _readings(element), strict=True):
-                self._edges[edge] = reading
-
     def domains(self) -> Iterator[tuple[str, Domain]]:
         """The nodes of the circuit, and their domains in the network."""
         for number, domain in enumerate(self._graph.domains):
@@ -126,6 +117,10 @@ class _Circuit:
                 quantities[name] = {f"{owner}.{renamed[owner].get(quantity, in_circuit(quantity))}": 1.0}
             elif name not in quantities:
                 quantities[name] = {f"{owner}.{in_circuit(quantity)}": 1.0}
+        for branch in graph.branches:
+            if branch.template.kind in (Kind.ACROSS_STORE, Kind.THROUGH_STORE):
+                owner, _, quantity = (name := store_name(graph, branch)).rpartition(".")
+                quantities.setdefault(name, {f"{owner}.{branch.template.label or in_circuit(quantity)}": 1.0})
         return quantities
 
 
@@ -154,7 +149,12 @@ def _names_in_circuit(part: Component) -> dict[str, str]:
     }
 
 
-def _made(element: Element) -> Component | None:
+def _is_admissible(part: Component) -> bool:
+    """Whether a part may have its values: a damping that drives, below zero, is no resistance."""
+    return all(declared.magnitude(part.values[name])[1] is None for name, declared in part.declared.items())
+
+
+def _made(element: Element) -> Component:
     """The part of a circuit that an element is."""
     name, symbol, value = element.name, element.symbol, element.value
     match element.kind:

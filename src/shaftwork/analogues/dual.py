@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Iterator, Sequence
 
 from shaftwork.analogues.analogy import Analogy
-from shaftwork.analogues.elements import Edge, Element, ElementNames, Sum, elements_of, is_linear
+from shaftwork.analogues.elements import Edge, Element, ElementNames, Sum, elements_of, in_numbers, is_linear
 from shaftwork.analogues.faces import DualEnds, Kuratowski, dual_ends
 from shaftwork.analogues.readings import EdgeReading, Readings, sums_of_nodes, total
 from shaftwork.analogues.rigid_joints import RigidJoints
@@ -51,7 +51,7 @@ def dual(netlist: Netlist, form: StateForm) -> Analogy:
     """
     graph = form.graph
     title_of_error = f"'{netlist.name}' has no dual"
-    if problems := tuple(_without_dual(part, graph) for part in graph.parts if not is_linear(part, graph)):
+    if problems := tuple(_without_dual(part, graph) for part in graph.parts if not _has_dual(part, graph)):
         raise NetworkError(title_of_error, problems)
     names = ElementNames(graph)
     idle = frozenset(form.tree.links[Kind.COUPLING])  # of gears side by side all but one, which carry nothing
@@ -106,6 +106,17 @@ def _add_loops(element: Element, edges: dict[Edge, EdgeReading]) -> None:
             edges.setdefault(edge, EdgeReading({}, total((factor / factors[base], edges[base].through))))
 
 
+def _has_dual(part: GraphPart, graph: CircuitGraph) -> bool:
+    return is_linear(part, graph) and not _drives(part, graph)
+
+
+def _drives(part: GraphPart, graph: CircuitGraph) -> bool:
+    """Whether a part has a damping below zero, which is no resistance."""
+    branches = (graph.branches[index] for index in part.branches)
+    laws = (in_numbers(one.template.law, one, graph) for one in branches if one.template.kind is Kind.CONDUCTANCE)
+    return any(law < 0 for law in laws)
+
+
 def _without_dual(part: GraphPart, graph: CircuitGraph) -> Diagnostic:
     """Why a part has no dual."""
     templates = [graph.branches[index].template for index in part.branches]
@@ -117,6 +128,8 @@ def _without_dual(part: GraphPart, graph: CircuitGraph) -> Diagnostic:
         why = "its laws read other nodes and branches"
     elif any(template.through for template in templates):
         why = "it loses power in its teeth"
+    elif _drives(part, graph):
+        why = "its torque rises with its speed"
     else:
         why = "its law is not linear"
     nodes = tuple(graph.node_name(number) for number in dict.fromkeys(part.nodes.values()))
