@@ -23,6 +23,7 @@ USES = {
     "reduce": "sw.reduce.refer(net, 'wheel')",
     "sizing": "sw.sizing.duty",
     "drawing": "net.draw()",
+    "analogues": "net.circuit().simulate(0.1)",
     "studies": "sw.studies.work_precision",
     "animation": "net.simulate(0.1).animate()",
     "spectra": "net.simulate(0.1).spectrum('shaft.tau')",

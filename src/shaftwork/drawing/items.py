@@ -69,6 +69,7 @@ class Item:
         ends: the nodes that it joins, in the order of its ends.
         lines: of text beside it, with formulas between dollar signs.
         ports: of a part with more than two ends the name of each, by node.
+        below: what hangs from its second end, and ends at the reference.
     """
 
     part: str
@@ -76,6 +77,7 @@ class Item:
     ends: tuple[End, ...]
     lines: tuple[str, ...]
     ports: Mapping[End, str] = field(default_factory=dict)
+    below: Item | None = None
 
 
 @dataclass(frozen=True)
@@ -115,13 +117,18 @@ class Letters:
             yield ", ".join(f"${letter}$" for letter in letters)
         yield from self._mode(part)
 
-    def of_branch(self, branch: GraphBranch, part: GraphPart) -> Iterator[str]:
-        """The parameter that a law is alone, of springs and dampers its inverse; else the name of the part."""
+    def of_branch(self, branch: GraphBranch, part: GraphPart, *, dual: bool = False) -> Iterator[str]:
+        """The parameter that a law is alone, of springs and dampers its inverse; else the name of the part.
+
+        In the dual a damper has its own letter, and a resistor the inverse.
+        """
         law, kind = branch.template.law, branch.template.kind
         symbol = next((symbol for symbol in law.free_symbols if law in (symbol, -symbol, 1 / symbol)), None)
         name = "" if symbol is None or symbol.name not in part.component.declared else symbol.name
         letter = self._letter(part, name) if name in part.parameters else ""
-        inverse = law == symbol and kind in (Kind.THROUGH_STORE, Kind.CONDUCTANCE)
+        inverse = kind in (Kind.THROUGH_STORE, Kind.CONDUCTANCE) and (law == symbol) != (
+            dual and kind is Kind.CONDUCTANCE
+        )
         if not letter:
             yield plain(part.name)
         elif not self.values:

@@ -148,7 +148,9 @@ class Layout:
 
     def _sort(self, place: int, item: Item) -> None:
         alive = [end for end in item.ends if end != GROUND]
-        if len(alive) == 1 and len(item.ends) <= 2:
+        if item.below is not None:
+            self.shunts[item.ends[0]].append(item)
+        elif len(alive) == 1 and len(item.ends) <= 2:
             self.shunts[alive[0]].append(item)
         elif len(item.ends) == 2 and alive[0] != alive[1]:
             first, second = (("node", end) for end in item.ends)
@@ -162,7 +164,7 @@ class Layout:
     def order(self) -> tuple[Station, ...]:
         """The stations in a row."""
         graph = nx.Graph()
-        graph.add_nodes_from(dict.fromkeys(("node", end) for item in self.items for end in item.ends if end != GROUND))
+        graph.add_nodes_from(dict.fromkeys(("node", end) for item in self.items for end in _row_ends(item)))
         graph.add_nodes_from(self.boxes)
         graph.add_edges_from((joint.first, joint.second) for joint in self.joints)
         rows = [row(graph.subgraph(nodes)) for nodes in nx.connected_components(graph)]
@@ -191,6 +193,11 @@ class Layout:
             tracks[number] = track
             used[track].append((low, high))
         return tracks
+
+
+def _row_ends(item: Item) -> tuple[End, ...]:
+    """The nodes of an item that stand in the row: not those between what hangs below each other."""
+    return item.ends[:1] if item.below is not None else tuple(end for end in item.ends if end != GROUND)
 
 
 def row(graph: nx.Graph) -> tuple[Station, ...]:

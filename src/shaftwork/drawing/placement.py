@@ -121,22 +121,30 @@ class _Placing:
         return x + SHEET.rise
 
     def _shunt(self, item: Item, node: End, x: float, row: _Row) -> float:
-        shape, text = item.shape, self._text_width(item)
+        shape = item.shape
         if shape.on_line:
+            text = self._text_width(item)
             half = max(text / 2, 12.0) + SHEET.space / 2
             row.result.spots.append(Spot(item, (x + half, 0.0), (x + half, shape.above + 3.0)))
             row.above = max(row.above, shape.above + _text_height(item))
             self.touches[node].append((x + half, 0))
             return x + 2 * half
-        centre = x + shape.below + SHEET.space / 2
-        begin, foot = (centre, -SHEET.lead), (centre, -SHEET.lead - LENGTH)
-        label = (centre + shape.above + 4.0, -SHEET.lead - LENGTH / 2)
-        row.result.spots.append(Spot(item, begin, label, turned=True, mirrored=item.ends[0] == GROUND))
-        row.result.leads[node].append(((centre, 0.0), begin))
+        column = [item] if item.below is None else [item, item.below]
+        text = max(map(self._text_width, column))
+        centre = x + max(each.shape.below for each in column) + SHEET.space / 2
+        above, foot = node, (centre, 0.0)
+        label_x = centre + max(each.shape.above for each in column) + 4.0
+        for each in column:
+            begin = centre, foot[1] - SHEET.lead
+            row.result.leads[above].append((foot, begin))
+            above, foot = each.ends[-1], (centre, begin[1] - LENGTH)
+            mirrored = each.ends[0] == GROUND
+            label = (label_x, begin[1] - LENGTH / 2)
+            row.result.spots.append(Spot(each, begin, label, turned=True, mirrored=mirrored))
         row.result.grounds.append(foot)
         row.below = max(row.below, -foot[1])
         self.touches[node].append((centre, 1))
-        return label[0] + text + SHEET.space
+        return label_x + text + SHEET.space
 
     def _box(self, place: int, station: Station, x: float, row: _Row) -> float:
         item = self.layout.boxes[station]
