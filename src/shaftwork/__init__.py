@@ -9,7 +9,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
-    from shaftwork import reduce as reduce, scenes as scenes, sizing as sizing, studies as studies
+    from shaftwork import (
+        reduce as reduce,
+        scenes as scenes,
+        sizing as sizing,
+        studies as studies,
+        torsional as torsional,
+    )
     from shaftwork.components.base import (
         Component as Component,
         Port as Port,
@@ -87,6 +93,7 @@ if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
     from shaftwork.pipeline.network import Network as Network
     from shaftwork.results.fatigue import SNLine as SNLine
     from shaftwork.results.solution import Solution as Solution
+    from shaftwork.torsional.calculation import torsional_calculation as torsional_calculation
 
 __version__ = "0.1.0"
 
@@ -142,8 +149,9 @@ _HOME = {
     "shaftwork.pipeline.network": ("Network",),
     "shaftwork.results.fatigue": ("SNLine",),
     "shaftwork.results.solution": ("Solution",),
+    "shaftwork.torsional.calculation": ("torsional_calculation",),
 }
-_PACKAGES = ("reduce", "scenes", "sizing", "studies")
+_PACKAGES = ("reduce", "scenes", "sizing", "studies", "torsional")
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 
 

@@ -55,7 +55,12 @@ class Harmonics:
 
     def __post_init__(self) -> None:
         orders = _numbers("orders", self.orders, "1", 1)
-        if not orders.size or orders.size > MOST_ORDERS or (orders <= 0).any() or len(set(orders.tolist())) < len(orders):
+        if (
+            not orders.size
+            or orders.size > MOST_ORDERS
+            or (orders <= 0).any()
+            or len(set(orders.tolist())) < len(orders)
+        ):
             raise ParameterError(
                 f"Harmonics: orders = {reprlib.repr(self.orders)} must be up to {MOST_ORDERS} different numbers above 0, "
                 "such as (0.5, 1, 1.5)."
@@ -203,7 +208,9 @@ class Harmonics:
                 total += Float(self.amplitudes[number]) * cos(turn + _phase(self.phases[number]))
         if self.omega_n is None:
             return total
-        return total * (Abs(speed) if self.exponent % 2 else speed) ** _order(self.exponent) / self.omega_n**self.exponent
+        return (
+            total * (Abs(speed) if self.exponent % 2 else speed) ** _order(self.exponent) / self.omega_n**self.exponent
+        )
 
 
 def _numbers(name: str, values: Any, unit: str, dimensions: int) -> NDArray[Any]:
