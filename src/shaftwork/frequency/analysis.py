@@ -60,16 +60,37 @@ def speeds_to_give(model: CompiledModel, reference: int | None = None) -> Mappin
     nodes = dict.fromkeys(node_of(form, branch) for branch in form.across_states)
     named = [node for node in nodes if node not in inside and form.graph.domains[node] is not ELECTRICAL]
     start = reference if reference is not None or not named else named[0]
-    ratios = {} if start is None else speeds_along(form.graph, start, joints(form.graph))
+    ratios = {} if start is None else turning_speeds(form.graph, start)
     return {speed_at(form, node): ratios.get(node) for node in named}
 
 
-def joints(graph: CircuitGraph) -> Iterator[Mapping[int, float]]:
+def turning_speeds(graph: CircuitGraph, start: int) -> dict[int, float]:
+    """Speeds of the nodes over that of one while no twist changes; those that no joint ties follow by their dampers.
+
+    What hangs on a damper alone, as the ring of a viscous damper does, turns with its shaft.
+
+    Args:
+        graph: the network.
+        start: the node whose speed is 1.
+    """
+    joined = list(_joints(graph))
+    speeds = speeds_along(graph, start, joined)
+    dampers = (graph.branches[k] for part in graph.parts if part.component.role == "loss" for k in part.branches)
+    hanging = (
+        {branch.plus: 1.0, branch.minus: -1.0}
+        for branch in dampers
+        if branch.template.kind in (Kind.CONDUCTANCE, Kind.LAW) and not {branch.plus, branch.minus} <= speeds.keys()
+    )
+    return speeds_along(graph, start, [*joined, *hanging])
+
+
+def _joints(graph: CircuitGraph) -> Iterator[Mapping[int, float]]:
     """Speeds of nodes that depend on each other while no twist changes: node to factor, in sums that are zero."""
     for part in graph.parts:
         branches = [graph.branches[k] for k in part.branches]
         kinds = {branch.template.kind for branch in branches}
-        if (part.modes and Kind.COUPLING not in kinds) or any(branch.template.is_history for branch in branches):
+        joined = bool(part.component.profiles()) or any(branch.template.is_history for branch in branches)
+        if joined or (part.modes and Kind.COUPLING not in kinds):  # of a long shaft, whatever is between its ends
             yield dict(zip((part.nodes[port.name] for port in part.component.ports), (1.0, -1.0), strict=False))
         for branch in branches:
             if branch.template.kind in (Kind.THROUGH_STORE, Kind.COUPLING):

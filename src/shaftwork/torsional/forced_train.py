@@ -13,14 +13,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from shaftwork.codegen.model_observer import ModelObserver
+from shaftwork.codegen.start_values import initial_state
 from shaftwork.components.base import Signal
+from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import ParameterError, no_quantity
-from shaftwork.formulation.value_diagnosis import speeds_along
-from shaftwork.frequency.analysis import joints, refuse_no_point, speeds_to_give
-from shaftwork.frequency.exact_networks import small_motions
+from shaftwork.core.parameters import in_si
+from shaftwork.frequency import campbell as diagram
+from shaftwork.frequency.analysis import refuse_no_point, speeds_to_give, turning_speeds
+from shaftwork.frequency.exact_networks import exact_shafts, small_motions
 from shaftwork.frequency.exact_spectrum import ExactProblem
 from shaftwork.frequency.frequency_response import StateEquations, forced_amplitudes
-from shaftwork.frequency.linear_model import ExactModel, LinearModel
+from shaftwork.frequency.linear_model import ExactModel, LinearModel, linear_model
+from shaftwork.frequency.linearization import Linearization
 from shaftwork.frequency.natural_modes import Modes
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart, signals_of
 from shaftwork.pipeline.arguments import Point, Time
@@ -39,6 +43,8 @@ from shaftwork.torsional.order_excitations import (
 
 SPREAD = (0.0, -0.5, 0.5, -1.0, 1.0, -2.0, 2.0, -4.0, 4.0)
 """Speeds beside a resonance, as multiples of the damping ratio: the response falls to 0.7 at 1 and to 0.24 at 4."""
+MOST_POINTS = 2000
+"""Linearisations that are kept for further questions at the same speeds."""
 COARSE = 41
 """Speeds at which a diagram looks for resonances that move with the speed."""
 
@@ -70,6 +76,35 @@ class PortPower(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
+class TurningTrain:
+    """The operating points of a train that turns as a whole: all speeds go with that of the reference shaft.
+
+    Args:
+        model: the train.
+        ratios: by name of a speed, its multiple.
+    """
+
+    model: Model
+    ratios: Mapping[str, float]
+
+    def __call__(self, speed: float) -> Point:
+        """The point at a speed in rad/s."""
+        return {name: speed * ratio for name, ratio in self.ratios.items()}
+
+    @cached_property
+    def _turning(self) -> Array:
+        """(n,) the states at 1 rad/s."""
+        return initial_state(self.model.bind(self.model.vector()), self.ratios, 0.0)
+
+    def near(self, speed: float, t: Time, inputs: tuple[str, ...]) -> LinearModel:
+        """The train about its point at a speed in rad/s, with the laws of a time in s."""
+        p, x = self.model.vector(), speed * self._turning
+        time = self.model.settled(p) if t is None else in_si("t", t, "s")
+        title = f"{self.model.name} at {speed:.5g} rad/s"
+        return linear_model(title, Linearization(self.model, p, x, time, inputs), None, x, time)
+
+
+@dataclass(frozen=True, eq=False)
 class ForcedTrain:
     """A train with its excitations, compiled once for all speeds.
 
@@ -98,12 +133,14 @@ class ForcedTrain:
     def _near(self) -> Callable[[float], LinearModel | ExactModel]:
         """From a speed in rad/s to the train about its point; one for all speeds where the point is the same."""
         motions = small_motions(self.model, Compiler((), LOOP), every=self.exact)
-        inputs = tuple(one.name for one in self.excitations)
-        if not callable(self.at):
-            always = motions(self.at, self.t, inputs)
+        inputs, at = tuple(one.name for one in self.excitations), self.at
+        if not callable(at):
+            always = motions(at, self.t, inputs)
             return lambda _: always
-        at = self.at
-        return lambda speed: motions(at(speed), self.t, inputs)
+        kept = BoundedCache[float, LinearModel | ExactModel](MOST_POINTS)
+        if isinstance(at, TurningTrain) and not exact_shafts(self.model.netlist, every=self.exact):
+            return lambda speed: kept(speed, lambda: at.near(speed, self.t, inputs))
+        return lambda speed: kept(speed, lambda: motions(at(speed), self.t, inputs))
 
     def amplitudes(self, speeds: Array, names: Sequence[str]) -> dict[str, Complex]:
         """Complex amplitudes of quantities in every order at speeds in rad/s: (n, k), along a part (n, k, places).
@@ -154,12 +191,23 @@ class ForcedTrain:
             ]
             inside = (one for one in met if speeds[0] <= one.speed <= speeds[-1])
             return tuple(sorted(inside))
-        coarse = np.linspace(speeds[0], speeds[-1], COARSE)
-        diagram = self.network.campbell(coarse, self.orders, top, at=self.at, exact=self.exact, t=self.t)
         return tuple(
             Resonance(one.speed, one.order, one.mode, one.frequency, self._damping(one.speed, one.frequency))
-            for one in diagram.crossings
+            for one in self.campbell(speeds, self.orders, top).crossings
         )
+
+    def campbell(self, speeds: Array, orders: Any, f_max: float | None) -> diagram.Campbell:
+        """Natural frequencies at the operating points from the first to the last of the speeds, with orders.
+
+        Raises:
+            ParameterError: orders or f_max are not what they must be.
+        """
+
+        def modes(speed: float, f_max: float) -> tuple[Modes, str]:
+            return self.modes(speed, f_max), self._near(speed).phase
+
+        coarse = np.linspace(speeds[0], speeds[-1], COARSE)
+        return diagram.campbell(self.network.name, modes, coarse, orders, f_max, constant=not callable(self.at))
 
     def _damping(self, speed: float, frequency: float) -> float:
         modes = self.modes(speed, 1.1 * frequency)
@@ -217,7 +265,7 @@ def _ratios(graph: CircuitGraph, excitations: Sequence[OrderExcitation]) -> tupl
     parts = {part.name: part for part in graph.parts}
     nodes = [parts[one.source.name].nodes for one in excitations]
     reference = next(node for node in nodes[0].values() if node != GROUND)
-    speeds = {GROUND: 0.0, **speeds_along(graph, reference, joints(graph))}
+    speeds = {GROUND: 0.0, **turning_speeds(graph, reference)}
     ratios = []
     for one, ends in zip(excitations, nodes, strict=True):
         first, *others = ends.values()
@@ -249,4 +297,4 @@ def _turning(model: Model, reference: int) -> Point | Callable[[float], Point]:
     ratios = speeds_to_give(model, reference)
     if modal or any(ratio is None for ratio in ratios.values()):
         refuse_no_point(model, "A torsional calculation")
-    return lambda speed: {name: speed * float(ratio or 0.0) for name, ratio in ratios.items()}
+    return TurningTrain(model, {name: float(ratio or 0.0) for name, ratio in ratios.items()})

@@ -221,10 +221,7 @@ class TorsionalCalculation(Mapping[str, ShaftVibration]):
         Raises:
             ParameterError: as of `Network.campbell`.
         """
-        train, speeds = self.train, np.linspace(self.speeds[0], self.speeds[-1], 41)
-        wanted = self.orders if orders is None else orders
-        point = {} if train.at is None else train.at
-        return train.network.campbell(speeds, wanted, f_max, at=point, exact=train.exact, t=train.t)
+        return self.train.campbell(self.speeds, self.orders if orders is None else orders, f_max)
 
     @cached_property
     def power_lost(self) -> Mapping[str, Array]:
