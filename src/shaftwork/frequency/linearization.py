@@ -8,6 +8,7 @@ torque winds up springs in series: the derivative of the input then enters the e
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Any
@@ -91,14 +92,35 @@ class Linearization:
             (rows, range(len(rows))),
         )
         self._enter = sparse.csr_array(entries, shape=(len(order), len(rows)))
-        self._by_state, self._by_input = _input_slopes(self._bound, t, x, self._enter)
+        self.B1: Array = (part.B1 @ self._enter).toarray()
+        self.weights = _energy_weights(self._bound)
+        self._take_slopes()
+
+    def _take_slopes(self) -> None:
+        """The matrices that follow from the slopes of the laws at the point."""
+        part, form = self._bound.part, self._form
+        self._by_state, self._by_input = _input_slopes(self._bound, *self._point, self._enter)
         self.A = sparse.csr_array(part.A + part.B @ self._by_state)
         self.B = (part.B @ self._by_input).toarray()
-        self.B1: Array = (part.B1 @ self._enter).toarray()
         ends = [form.outputs.index(branch) for branch in form.waves]
         self.C = sparse.csr_array(part.C[ends] + part.D[ends] @ self._by_state)
         self.D = (part.D[ends] @ self._by_input).toarray()
-        self.weights = _energy_weights(self._bound)
+
+    def moved(self, x: Array, t: float) -> Linearization:
+        """The same network and inputs near another point, without assembling anew.
+
+        Args:
+            x: (n,) states there.
+            t: time at which laws are read, s.
+
+        Raises:
+            SimulationError: a law has no finite slope there.
+        """
+        other = copy.copy(self)
+        vars(other).pop("_nominal", None)
+        other._point = (t, x)
+        other._take_slopes()
+        return other
 
     @cached_property
     def _names(self) -> _Reader:

@@ -96,12 +96,17 @@ class TurningTrain:
         """(n,) the states at 1 rad/s."""
         return initial_state(self.model.bind(self.model.vector()), self.ratios, 0.0)
 
-    def near(self, speed: float, t: Time, inputs: tuple[str, ...]) -> LinearModel:
-        """The train about its point at a speed in rad/s, with the laws of a time in s."""
-        p, x = self.model.vector(), speed * self._turning
+    def near(self, t: Time, inputs: tuple[str, ...]) -> Callable[[float], LinearModel]:
+        """From a speed in rad/s to the train about its point, with the laws of a time in s; assembled once for all."""
+        p = self.model.vector()
         time = self.model.settled(p) if t is None else in_si("t", t, "s")
-        title = f"{self.model.name} at {speed:.5g} rad/s"
-        return linear_model(title, Linearization(self.model, p, x, time, inputs), None, x, time)
+        slopes = Linearization(self.model, p, self._turning, time, inputs)
+
+        def about(speed: float) -> LinearModel:
+            x = speed * self._turning
+            return linear_model(f"{self.model.name} at {speed:.5g} rad/s", slopes.moved(x, time), None, x, time)
+
+        return about
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +144,8 @@ class ForcedTrain:
             return lambda _: always
         kept = BoundedCache[float, LinearModel | ExactModel](MOST_POINTS)
         if isinstance(at, TurningTrain) and not exact_shafts(self.model.netlist, every=self.exact):
-            return lambda speed: kept(speed, lambda: at.near(speed, self.t, inputs))
+            about = at.near(self.t, inputs)
+            return lambda speed: kept(speed, lambda: about(speed))
         return lambda speed: kept(speed, lambda: motions(at(speed), self.t, inputs))
 
     def amplitudes(self, speeds: Array, names: Sequence[str]) -> dict[str, Complex]:
