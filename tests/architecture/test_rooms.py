@@ -24,10 +24,12 @@ USES = {
     "sizing": "sw.sizing.duty",
     "drawing": "net.draw()",
     "studies": "sw.studies.work_precision",
+    "torsional": "sw.torsional.Section",
 }
 """By feature, something small that takes it."""
 
 JOINS = {
+    "frequency": ("shaftwork.torsional.forced_train",),
     "hybrid": ("shaftwork.waves.phased_waves", "shaftwork.waves.hybrid_waves", "shaftwork.sweep.phased_ensemble"),
     "latex": ("shaftwork.lagrange.lagrange_print", "shaftwork.reduce.reduction_print"),
 }

@@ -62,14 +62,14 @@ class Harmonics:
             or len(set(orders.tolist())) < len(orders)
         ):
             raise ParameterError(
-                f"Harmonics: orders = {reprlib.repr(self.orders)} must be up to {MOST_ORDERS} different numbers above 0, "
-                "such as (0.5, 1, 1.5)."
+                f"Harmonics: orders = {reprlib.repr(self.orders)} must be up to {MOST_ORDERS} different numbers above "
+                "0, such as (0.5, 1, 1.5)."
             )
         speeds = _numbers("speeds", self.speeds, "rad/s", 1)
         if len(speeds) == 1 or (speeds < 0).any() or (np.diff(speeds) <= 0).any():
             raise ParameterError(
-                f"Harmonics: speeds = {reprlib.repr(self.speeds)} must be two or more, ascending from 0 or above; leave "
-                "them out where the amplitudes are the same at all speeds."
+                f"Harmonics: speeds = {reprlib.repr(self.speeds)} must be two or more, ascending from 0 or above; "
+                "leave them out where the amplitudes are the same at all speeds."
             )
         shape = (len(speeds), len(orders)) if len(speeds) else (len(orders),)
         tables = {
@@ -138,8 +138,8 @@ class Harmonics:
     def reciprocating(cls, mass: float, *, stroke: float, rod: float) -> Self:
         """Harmonics of the masses that move to and fro in a cylinder: piston, and a part of the connecting rod.
 
-        Law: torque = -mass x' x'' omega^2 with x(phi) = r cos(phi) + (rod^2 - r^2 sin(phi)^2)^(1/2), r = stroke / 2, and
-        primes by phi, from top dead centre; it grows with the square of the speed.
+        Law: torque = -mass x' x'' omega^2 with x(phi) = r cos(phi) + (rod^2 - r^2 sin(phi)^2)^(1/2), r = stroke / 2,
+        and primes by phi, from top dead centre; it grows with the square of the speed.
 
         Args:
             mass: kg.
@@ -168,7 +168,7 @@ class Harmonics:
             blades: number.
             torque: mean torque at the nominal speed, N m.
             omega_n: nominal speed, rad/s.
-            shares: amplitudes of the orders blades, 2 blades, ..., over the mean torque; those of the default are chosen.
+            shares: amplitudes of the orders blades, 2 blades, ..., over the mean torque; the default is chosen.
 
         Raises:
             ParameterError: a value is out of its bounds.
@@ -247,11 +247,11 @@ def _phase(value: float) -> Expr:
 class HarmonicTorque(Component):
     """A torque that swings with the angle of its shaft, given to node a and taken from node b where it has one.
 
-    Law: tau = mean + scale sum_k A_k cos(k (phi - phi_f) + psi_k), positive raises the speed of a, with phi the angle of
-    a relative to b and A, psi the harmonics. A cylinder of an engine is one, with its firing angle phi_f; so is a
+    Law: tau = mean + scale sum_k A_k cos(k (phi - phi_f) + psi_k), positive raises the speed of a, with phi the angle
+    of a relative to b and A, psi the harmonics. A cylinder of an engine is one, with its firing angle phi_f; so is a
     propeller. A simulation reads the angle as it swings. Linear analyses have it at one angle, which `modes` and
-    `campbell` warn of; `torsional_calculation` takes the mean for the train, and the swing, at the angle of a shaft that
-    turns steadily, as its excitation. Analogue: a current source.
+    `campbell` warn of; `torsional_calculation` takes the mean for the train, and the swing, at the angle of a shaft
+    that turns steadily, as its excitation. Analogue: a current source.
     """
 
     harmonics: Harmonics = parameter("1", "orders with amplitudes and phases", record=Harmonics)

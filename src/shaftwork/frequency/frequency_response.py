@@ -175,8 +175,8 @@ def forced_amplitudes(
         chunks.append(values)
     amplitudes = [np.concatenate(parts) for parts in zip(*chunks, strict=True)]
     for k in np.flatnonzero(hit).tolist():
-        for values, limit in zip(amplitudes, forced.limits(s[k], v[:, k : k + 1]), strict=True):
-            values[k] = limit
+        for amplitude, limit in zip(amplitudes, forced.limits(s[k], v[:, k : k + 1]), strict=True):
+            amplitude[k] = limit
     return amplitudes
 
 
@@ -198,8 +198,8 @@ class _Forced:
         hit = ~(length * self._nearness(s) <= np.linalg.norm(self._probe))  # also where it is NaN
         solved[hit] = 0.0
         x = np.asarray(solved[:, :, 0].T / self._slopes.weights[:, None])
-        amplitude = self._slopes.swinging(s, x, v)
-        return [amplitude(name) for name in self._outputs], hit
+        read = self._slopes.swinging(s, x, v)
+        return [read(name) for name in self._outputs], hit
 
     def _nearness(self, s: Complex) -> Array:
         """The distance from s within which an eigenvalue is hit, 1/s."""

@@ -142,7 +142,7 @@ SHIP_ENGINE = Scene(
     signals=("intermediate shaft.tau_a", "propeller shaft.tau_b", "crank 4.tau", "propeller.omega"),
     chosen=(
         "all dimensions, inertias and dampings are chosen as typical",
-        "gas torques: harmonics of an ideal cycle with compression 13 : 1, polytropic exponent 1.36 and 0.25 MPa boost, "
+        "gas torques: harmonics of an ideal cycle, compression 13 : 1, polytropic exponent 1.36, 0.25 MPa of boost, "
         "rounded; combustion grows with the load, which goes with the square of the speed",
         "propeller of four blades whose torque swings by 5 % and 1 % in the first two blade orders",
     ),

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from shaftwork.results.observer import RPM, Array
@@ -66,7 +67,7 @@ def barred_ranges(
     found = []
     for first, last in _runs(exceeding):
         start, end = _crossing(speeds, first - 1, above), _crossing(speeds, last, above)
-        inside = np.arange(first, last + 1)
+        inside = np.arange(first, last + 1, dtype=np.intp)
         critical = speeds[inside[_is_peak(stress, inside)]]
         ratio = critical / rated
         low = min([start, *(16 * critical / (18 - ratio)).tolist()])
@@ -80,7 +81,7 @@ def barred_ranges(
     return tuple(_judged(one, rated) for one in _merged(found))
 
 
-def _runs(flags: Array) -> list[tuple[int, int]]:
+def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """First and last place of each row of places that are true."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     return [(int(first), int(end) - 1) for first, end in zip(edges[::2], edges[1::2], strict=True)]
@@ -99,7 +100,7 @@ def _crossing(speeds: Array, place: int, above: Callable[[float], float]) -> flo
     return float(brentq(above, low, high, rtol=REFINED))
 
 
-def _is_peak(stress: Array, places: Array) -> Array:
+def _is_peak(stress: Array, places: NDArray[np.intp]) -> NDArray[np.bool_]:
     """Which places are no lower than both neighbours."""
     padded = np.concatenate([[-np.inf], stress, [-np.inf]])
     return np.asarray((padded[places + 1] >= padded[places]) & (padded[places + 1] >= padded[places + 2]))

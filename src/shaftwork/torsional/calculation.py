@@ -44,8 +44,8 @@ def torsional_calculation(
 
     Law: at the steady speed n of the reference shaft, that of the first `HarmonicTorque`, the order k of every torque
     swings as exp(i k n t). The train is linear about its operating point, and each order passes through it for itself.
-    The waveform over a cycle is their sum, and the vibratory torque is half of its peak to peak. To the given speeds are
-    added those at which an order meets a natural frequency, and some beside each, so that no peak is missed.
+    The waveform over a cycle is their sum, and the vibratory torque is half of its peak to peak. To the given speeds
+    are added those at which an order meets a natural frequency, and some beside each, so that no peak is missed.
 
     Args:
         net: the train, with a `HarmonicTorque` for each cylinder, propeller or other torque that swings by the angle.
@@ -143,7 +143,7 @@ def _refined(speeds: Array, resonances: Sequence[tuple[float, float]]) -> Array:
 
     beside = [speed * (1 + damping * step) for speed, damping in resonances for step in (SPREAD if damping else (0.0,))]
     n = np.unique(np.concatenate([speeds, [speed for speed in beside if speeds[0] <= speed <= speeds[-1]]]))
-    return n[np.concatenate([[True], np.diff(n) > NEAREST * n[1:]])]
+    return np.asarray(n[np.concatenate([[True], np.diff(n) > NEAREST * n[1:]])])
 
 
 def _barred(vibration: ShaftVibration, train: ForcedTrain, torque: str, rated: float) -> tuple[BarredRange, ...]:

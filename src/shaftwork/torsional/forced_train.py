@@ -20,6 +20,7 @@ from shaftwork.core.errors import ParameterError, no_quantity
 from shaftwork.core.parameters import in_si
 from shaftwork.frequency import campbell as diagram
 from shaftwork.frequency.analysis import refuse_no_point, speeds_to_give, turning_speeds
+from shaftwork.frequency.exact_lines import ExactSlopes
 from shaftwork.frequency.exact_networks import exact_shafts, small_motions
 from shaftwork.frequency.exact_spectrum import ExactProblem
 from shaftwork.frequency.frequency_response import StateEquations, forced_amplitudes
@@ -151,8 +152,8 @@ class ForcedTrain:
     def amplitudes(self, speeds: Array, names: Sequence[str]) -> dict[str, Complex]:
         """Complex amplitudes of quantities in every order at speeds in rad/s: (n, k), along a part (n, k, places).
 
-        Law: of the order k the torques of all sources swing as exp(i k n t), and each quantity with them. Infinite where
-        an undamped natural frequency is hit exactly.
+        Law: of the order k the torques of all sources swing as exp(i k n t), and each quantity with them. Infinite
+        where an undamped natural frequency is hit exactly.
 
         Raises:
             SignalError: there is no such quantity.
@@ -167,7 +168,7 @@ class ForcedTrain:
         for name in names:
             if name not in slopes.units and name not in slopes.profiles:
                 raise no_quantity(name, near.title, (*slopes.units, *slopes.profiles))
-        system = ExactProblem(slopes) if isinstance(near, ExactModel) else StateEquations(slopes)
+        system = ExactProblem(slopes) if isinstance(slopes, ExactSlopes) else StateEquations(slopes)
         s = 1j * np.multiply.outer(speeds, np.asarray(self.orders)).ravel()
         v = amplitudes_of(self.excitations, self.orders, speeds).reshape(len(self.excitations), -1)
         values = forced_amplitudes(slopes, system, s, v, names)
@@ -278,9 +279,9 @@ def _ratios(graph: CircuitGraph, excitations: Sequence[OrderExcitation]) -> tupl
         missing = next((node for node in ends.values() if node not in speeds), None)
         if missing is not None:
             raise ParameterError(
-                f"HarmonicTorque '{one.source.name}': the speed of its node '{graph.node_name(missing)}' does not follow "
-                f"from that of '{graph.node_name(reference)}', so that its orders have no frequency. Join them by "
-                "springs, shafts or gears."
+                f"HarmonicTorque '{one.source.name}': the speed of its node '{graph.node_name(missing)}' does not "
+                f"follow from that of '{graph.node_name(reference)}', so that its orders have no frequency. Join "
+                "them by springs, shafts or gears."
             )
         ratios.append(speeds[first] - sum(speeds[node] for node in others))
         if ratios[-1] == 0:

@@ -51,8 +51,8 @@ class HolzerShaft(NamedTuple):
 class HolzerMode:
     """A mode as a table.
 
-    Law: between two masses in a row the torque changes by J omega^2 times the angle of the mass. Amplitudes are those of
-    the damped mode in phase with the measuring mass.
+    Law: between two masses in a row the torque changes by J omega^2 times the angle of the mass. Amplitudes are those
+    of the damped mode in phase with the measuring mass.
 
     Args:
         name: "mode 1".

@@ -16,7 +16,7 @@ LARGEST_CYCLE = 120
 COMMENSURATE = 1e-9
 """An order this near a fraction, relatively, is one."""
 OVERSAMPLING = 16
-"""Samples over half a swing of the highest order: a peak between two samples is then near enough for Newton's method."""
+"""Samples over half a swing of the highest order: peaks between samples are then near enough for Newton's method."""
 PEAKS, POLISHED = 4, 5
 """Highest samples of a waveform that are refined, as two peaks may be nearly alike, and steps of Newton's method."""
 

@@ -18,7 +18,7 @@ from shaftwork.results.observer import RPM, Array, Complex
 from shaftwork.torsional.barred_ranges import overlapping
 from shaftwork.torsional.holzer import HolzerTable, holzer_table
 from shaftwork.torsional.order_sums import cycle_of, waveform
-from shaftwork.torsional.shaft_vibration import HEADS, ShaftVibration
+from shaftwork.torsional.shaft_vibration import HEADS, ShaftVibration, worst_along
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -96,7 +96,7 @@ class TorsionalCalculation(Mapping[str, ShaftVibration]):
 
     @property
     def table(self) -> tuple[tuple[str, ...], ...]:
-        """By shaft: name, largest vibratory torque in kN m, its speed in 1/min, its largest order, stress, tau_c, verdict."""
+        """By shaft: name, largest vibratory torque in kN m, its speed in 1/min, main order, stress, tau_c, verdict."""
         return tuple(one.row for one in self.shafts.values())
 
     def __str__(self) -> str:
@@ -125,7 +125,7 @@ class TorsionalCalculation(Mapping[str, ShaftVibration]):
         Raises:
             SignalError: there is no such quantity.
         """
-        return self.train.amplitudes(self.speeds, (name,))[name]
+        return np.asarray(self.train.amplitudes(self.speeds, (name,))[name])
 
     def waveform(self, name: str, speed: Any) -> tuple[Array, Array]:
         """A quantity over one cycle at a speed, without its mean.
@@ -161,14 +161,12 @@ class TorsionalCalculation(Mapping[str, ShaftVibration]):
 
     def _parts(self, name: str, speed: Any) -> Complex:
         """(k,) amplitudes at a speed."""
-        from shaftwork.torsional.shaft_vibration import worst_along
-
         n = np.array([in_si("speed", speed, "rad/s", above=0)])
         quantity = self.torques.get(name, name)
         amplitudes = self.train.amplitudes(n, (quantity,))[quantity]
         if name not in self.torques and amplitudes.ndim > 2:
             raise SignalError(f"'{name}' is read along a part. Name the shaft, '{name.rpartition('.')[0]}'.")
-        parts = worst_along(amplitudes, self.orders, self.train.places(quantity))[0][0]
+        parts = np.asarray(worst_along(amplitudes, self.orders, self.train.places(quantity))[0][0])
         if not np.isfinite(parts).all():
             raise ParameterError(f"'{name}' has no bound at {n[0]:g} rad/s: an undamped resonance. Add damping.")
         return parts
@@ -273,7 +271,7 @@ class TorsionalCalculation(Mapping[str, ShaftVibration]):
         return frames(rows)
 
     def plot(self, *shafts: str) -> Figure:
-        """Vibratory stress (torque, without a section) over the speed with its largest orders and limits (extra `plot`).
+        """Vibratory stress (or torque, without a section) over speed with its largest orders and limits (extra `plot`).
 
         Args:
             *shafts: names; by default those with a section, or else all.
