@@ -27,7 +27,7 @@ class BarredRange:
         start: rad/s, of the reference shaft.
         end: rad/s.
         exceeded: from and to which speed in rad/s the stress itself is above tau_c; a pair for each such interval.
-        critical: the speeds in rad/s of the peaks within.
+        critical: the speeds in rad/s of the peaks within, among those of the calculation.
         stress: the largest, Pa.
         share: the largest of stress over tau_t, what is permitted while the range is passed; above 1 it must not be.
         allowed: whether the rules allow to bar it: all below 0.8 of the rated speed, and `share` at most 1.
