@@ -23,7 +23,7 @@ MOST_ORDERS = 200
 """Orders of one torque; more is a typing error."""
 SAMPLES = 720
 """Angles per turn at which the mechanism of a cylinder is sampled: its series falls as (stroke / 2 rod)^order."""
-NEGLIGIBLE = 1e-9
+NEGLIGIBLE = 1e-6
 """Orders of the reciprocating masses below this fraction of the largest are left out."""
 
 
