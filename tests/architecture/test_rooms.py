@@ -28,6 +28,7 @@ USES = {
     "animation": "net.simulate(0.1).animate()",
     "spectra": "net.simulate(0.1).spectrum('shaft.tau')",
     "reporting": "sw.report(net, sections=['parts'])",
+    "torsional": "sw.torsional.Section",
 }
 """By feature, something small that takes it."""
 
@@ -35,6 +36,7 @@ NEEDS = {"reporting": ("latex", "drawing", "modelfiles")}
 """By feature, those that it is made of."""
 
 JOINS = {
+    "frequency": ("shaftwork.torsional.forced_train",),
     "drawing": ("shaftwork.reporting",),
     "modelfiles": ("shaftwork.reporting",),
     "hybrid": ("shaftwork.waves.hybrid_wave_model", "shaftwork.waves.hybrid_waves", "shaftwork.sweep.hybrid_ensemble"),

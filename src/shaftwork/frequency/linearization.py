@@ -8,6 +8,7 @@ torque winds up springs in series: the derivative of the input then enters the e
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Any
@@ -71,7 +72,7 @@ class Linearization:
         places = places_of(model.form.graph, inputs)
         form, branches = with_inputs(model.form, places)
         x = x if arriving is None else np.concatenate([x, arriving])
-        self._form, self._point = form, (t, x)
+        self._form = form
         self._bound = model.bind(p) if form is model.form else ArrayProgram(form).bind(p)
         if self._bound.loops is not None and (solved := model.bind(p).loops) is not None:
             self._bound.loops.start_from(solved.solve(t, x))  # the same of several solutions
@@ -86,14 +87,35 @@ class Linearization:
             (rows, range(len(rows))),
         )
         self._enter = sparse.csr_array(entries, shape=(len(order), len(rows)))
+        self.B1: Array = (part.B1 @ self._enter).toarray()
+        self.weights = _energy_weights(self._bound)
+        self._take_slopes(t, x)
+
+    def _take_slopes(self, t: float, x: Array) -> None:
+        """The matrices that follow from the slopes of the laws at a point."""
+        part, form = self._bound.part, self._form
+        self._point = (t, x)
         self._by_state, self._by_input = _input_slopes(self._bound, t, x, self._enter)
         self.A = sparse.csr_array(part.A + part.B @ self._by_state)
         self.B = (part.B @ self._by_input).toarray()
-        self.B1: Array = (part.B1 @ self._enter).toarray()
         ends = [form.outputs.index(branch) for branch in form.waves]
         self.C = sparse.csr_array(part.C[ends] + part.D[ends] @ self._by_state)
         self.D = (part.D[ends] @ self._by_input).toarray()
-        self.weights = _energy_weights(self._bound)
+
+    def moved(self, x: Array, t: float) -> Linearization:
+        """The same network and inputs near another point, without assembling anew.
+
+        Args:
+            x: (n,) states there.
+            t: time at which laws are read, s.
+
+        Raises:
+            SimulationError: a law has no finite slope there.
+        """
+        other = copy.copy(self)
+        vars(other).pop("_nominal", None)
+        other._take_slopes(t, x)  # noqa: SLF001 (of its own class)
+        return other
 
     @cached_property
     def _names(self) -> _Reader:
