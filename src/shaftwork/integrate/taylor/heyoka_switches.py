@@ -8,15 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.integrate.problem import Array
+from shaftwork.numerics.tolerances import EPS, GOLDEN
 from shaftwork.numerics.zeros import LOOKS
 
 # A switch that is on the wrong side by more than this part of its largest value has missed its event.
 WRONG_SIDE = 1e-9
 # How far rounding may have moved time and states, as a part of them.
-ROUNDINGS = 256 * float(np.finfo(float).eps)
+ROUNDINGS = 256 * EPS
 
 # Where in a piece switches of the time are read: a law that touches its threshold does so in the middle, if anywhere.
-SOMEWHERE = 0.381966
+SOMEWHERE = 1.0 - GOLDEN
 # Where in a step the sides of the switches are looked at, its end included.
 INSIDE = np.append(LOOKS[1:-1], 1.0)
 
@@ -178,8 +179,17 @@ class SwitchWatch:
                 passed, whole = cooldown
                 self._cooled[number] = integrator.time - passed + whole
         if past.any():
-            # Right at its event (heyoka still "cools" it down) a switch may be on the wrong side by rounding.
-            past &= [cooldown is None for cooldown in cooling]
+            # Right at its event (heyoka still "cools" it down) a switch may be on the wrong side by rounding. It comes
+            # over then. One that rounding made turn, as a speed to which a motion has hardly come yet, may cool for
+            # long, and go on to the side on which it is without an event.
+            away = [
+                cooldown is None or (bool(past[number]) and self._goes_away(integrator, number))
+                for number, cooldown in enumerate(cooling)
+            ]
+            for number, cooldown in enumerate(cooling):
+                if cooldown is not None:
+                    wrong[number] = wrong[number] and away[number] and self._moved(integrator, number)
+            past &= away
             # In a step too short for heyoka to see an event a switch is past it by that step, and has just turned too.
             wrong &= past & (integrator.time - self._last >= self._short)
             # A speed that dies away turns while heyoka still cools its last turn down: wrong only where it matters.
@@ -216,13 +226,30 @@ class SwitchWatch:
         self.last_good = now, integrator.state.copy()
         return True
 
-    def _matters(self, integrator: Any, number: int) -> bool:
-        """Whether the motion is another one on the other side of a switch."""
+    def _moved(self, integrator: Any, number: int) -> bool:
+        """Whether the last step would have ended elsewhere, by more than rounding, on the other side of a switch."""
+        here, there = self._both_sides(integrator, number)
+        moved = np.abs(here - there).max() * (integrator.time - self._last)
+        return bool(moved > EPS * np.abs(integrator.state).max())
+
+    def _both_sides(self, integrator: Any, number: int) -> tuple[Array, Array]:
+        """(n,) slopes with the sign of a switch and with the other one."""
         other = integrator.pars.copy()
         other[self._signs.start + number] *= -1.0
-        here, there = (
-            self._program.slopes(integrator.time, integrator.state, each) for each in (integrator.pars, other)
-        )
+        slopes, at = self._program.slopes, (integrator.time, integrator.state)
+        return slopes(*at, integrator.pars), slopes(*at, other)
+
+    def _goes_away(self, integrator: Any, number: int) -> bool:
+        """Whether a switch goes on to the side of zero on which it is."""
+        time, state, pars = integrator.time, integrator.state, integrator.pars
+        later = state + self._short * self._program.slopes(time, state, pars)
+        here = self._program.switch_values(time, state, pars)[number]
+        there = self._program.switch_values(time + self._short, later, pars)[number]
+        return bool(here * (there - here) > 0.0)
+
+    def _matters(self, integrator: Any, number: int) -> bool:
+        """Whether the motion is another one on the other side of a switch."""
+        here, there = self._both_sides(integrator, number)
         return not np.allclose(here, there, rtol=WRONG_SIDE, atol=0.0)
 
     def _drives_back(self, integrator: Any, number: int) -> bool:
