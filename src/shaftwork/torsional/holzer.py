@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, overload
 
 import numpy as np
 
@@ -97,7 +97,13 @@ class HolzerTable:
     def __len__(self) -> int:
         return len(self.modes)
 
-    def __getitem__(self, number: int) -> HolzerMode:
+    @overload
+    def __getitem__(self, number: int) -> HolzerMode: ...
+
+    @overload
+    def __getitem__(self, number: slice) -> tuple[HolzerMode, ...]: ...
+
+    def __getitem__(self, number: int | slice) -> HolzerMode | tuple[HolzerMode, ...]:
         return self.modes[number]
 
     def __str__(self) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from shaftwork.core.errors import ParameterError, SignalError, imported
+from shaftwork.core.notebook import html_table
 from shaftwork.core.parameters import in_si
 from shaftwork.core.screen import counted, in_columns
 from shaftwork.results.fatigue import Damage, SNLine, damage, rainflow
@@ -108,16 +108,8 @@ class TorsionalCalculation(Mapping[str, ShaftVibration]):
         return str(self)
 
     def _repr_html_(self) -> str:
-        """The table as a notebook shows it."""
-        cells = [
-            "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in row)
-            for tag, rows in (("th", (HEADS,)), ("td", self.table))
-            for row in rows
-        ]
         barred = [f"{one.shaft}: {barred}" for one in self.shafts.values() for barred in one.barred]
-        notes = "".join(f"<li>{html.escape(line)}</li>" for line in barred)
-        rows = "".join(f"<tr>{row}</tr>" for row in cells)
-        return f"<p>{html.escape(self.heading)}</p><table>{rows}</table>" + (f"<ul>{notes}</ul>" if notes else "")
+        return html_table(self.heading, HEADS, self.table, "; ".join(barred))
 
     def orders_of(self, name: str) -> Complex:
         """(n, k) complex amplitudes of any quantity, "flywheel.omega", in every order; along a shaft (n, k, places).
