@@ -14,7 +14,7 @@ from shaftwork.latex.blocks import Block, Blocks
 from shaftwork.latex.document import in_sections, section
 from shaftwork.latex.nomenclature import nomenclature, unit
 from shaftwork.latex.printing import Line
-from shaftwork.latex.shaft_blocks import Sums
+from shaftwork.latex.shaft_sums import Sums
 
 if TYPE_CHECKING:
     from shaftwork.equations.second_order import Square
@@ -65,7 +65,7 @@ class _LagrangeBlocks:
     def __init__(self, lagrangian: Lagrangian, blocks: Blocks) -> None:
         self.lagrangian, self.blocks, self.writer = lagrangian, blocks, blocks.writer
         self.graph = blocks.equations.form.graph
-        self.quantities = blocks.equations.assembly.quantities
+        self.quantities = blocks.quantities
 
     def printed(self) -> Iterator[Block]:
         """All blocks."""
@@ -130,7 +130,7 @@ class _LagrangeBlocks:
 
     def _motions(self) -> Iterator[Line]:
         """The equations of motion; one row for all inside a shaft that is printed as sums."""
-        inside = {self.graph.nodes[node] for summed in self._sums for node in summed.inside}
+        inside = {self.graph.nodes[node] for summed in self._sums for node in summed.shaft.inside}
         yield from (self._motion(row) for row in self.lagrangian.equations if row.node not in inside)
         for summed in self._sums:
             yield from summed.motion()
@@ -140,12 +140,12 @@ class _LagrangeBlocks:
         ends = [
             (summed, str(number))
             for summed in self._sums
-            for number, end in summed.ends
+            for number, end in summed.shaft.ends
             if self.graph.nodes[summed.part.nodes[end]] == row.node
         ]
         if not ends:
             return self.writer.line(row.sides)
-        twists = {node for summed, _ in ends for node in summed.twists}
+        twists = {node for summed, _ in ends for node in summed.shaft.twists}
         rates = (row.coordinate, rate_of(row.coordinate))
         shown = [
             square.pull(symbol)

@@ -16,11 +16,14 @@ from shaftwork.core.domains import ELECTRICAL, ROTATION, TRANSLATION
 from shaftwork.core.errors import CompileError
 from shaftwork.equations.assembly import FactoredTerms, Sides, sides, terms_of, tidy
 from shaftwork.equations.notations import in_letters
-from shaftwork.equations.quantities import ThroughQuantity, rate_of
-from shaftwork.equations.second_order import SecondOrder
+from shaftwork.equations.kirchhoff import kirchhoff
+from shaftwork.equations.quantities import Quantities, ThroughQuantity, rate_of
+from shaftwork.equations.second_order import SecondOrder, second_order
 from shaftwork.equations.spelling import INDEX_CLOSES, INDEX_OPENS, in_text
+from shaftwork.latex.compact_rows import SpectralShaft, compact_assembly, in_sums, spectral_shafts
+from shaftwork.latex.field_lines import lines_of_field
 from shaftwork.latex.printing import LINE_WIDTH, Line, Writer, printed_width, with_rates
-from shaftwork.latex.shaft_blocks import MEANING, WEIGHTS, Sums, lines_of_field, sums_of
+from shaftwork.latex.shaft_sums import MEANING, Sums, printed_sums, printed_weights
 from shaftwork.network.kinds import Kind
 
 if TYPE_CHECKING:
@@ -63,22 +66,28 @@ class Blocks:
         Args:
             twists: print whose integrals the angles in laws are; not needed above the state form, which says it.
         """
-        equations = self.equations
-        domains = dict.fromkeys(equations.form.graph.domains)
+        domains = dict.fromkeys(self.equations.form.graph.domains)
         balanced = " and ".join(", ".join(BALANCES[domain] for domain in domains).rsplit(", ", 1))
-        nodes = [row for number, row in enumerate(equations.nodes) if number not in self.inside]
+        nodes = [row for number, row in enumerate(self._rows.nodes) if number not in self.inside | self.twists]
         balances = (summed.balance() for summed in self.sums)
         yield Block(f"Balance of {balanced} at the nodes", (*self._lines(nodes), *balances))
-        loops = [row for row in equations.loops if equations.assembly.ends(row.link)[0] not in self.twists]
+        loops = [row for row in self._rows.loops if self._ends_of(row.link)[0] not in self.twists]
         rates = (line for summed in self.sums for line in summed.loops())
         yield Block("Speeds around the loops", (*self._lines(loops), *rates))
-        around = {_to_rounding(row.expression) for row in equations.loops}  # only asked for membership
-        said = [(_to_rounding(row.expression), _to_rounding(-row.expression)) for row in equations.couplings]
-        couplings = [row for row, both in zip(equations.couplings, said, strict=True) if around.isdisjoint(both)]
-        lossy = any(branch.template.through for branch in equations.form.graph.branches)
-        yield Block("Couplings" if lossy else "Ideal couplings", tuple(self._lines(couplings)))
-        integrals = [row for row in equations.states if row.name in self._integrals] if twists else []
+        lossy = any(branch.template.through for branch in self.equations.form.graph.branches)
+        yield Block("Couplings" if lossy else "Ideal couplings", tuple(self._lines(self._couplings())))
+        integrals = [row for row in self._rows.states if row.name in self._integrals] if twists else []
         yield Block("Laws of the parts", (*self._laws(), *self._lines(integrals)))
+
+    def _couplings(self) -> Iterator[Row]:
+        """The couplings that say what no loop says."""
+        rows = self._rows
+        around = {_to_rounding(row.expression) for row in rows.loops}  # only asked for membership
+        along = {branch for shaft in self.shafts for branch in shaft.couplings}  # so is this
+        for row in rows.couplings:
+            said = _to_rounding(row.expression), _to_rounding(-row.expression)
+            if row.branches[0] not in along and around.isdisjoint(said):
+                yield row
 
     @cached_property
     def _integrals(self) -> frozenset[str]:
@@ -88,30 +97,49 @@ class Blocks:
         """The definitions of the letters that stand for several parameters; nothing where numbers are printed."""
         definitions = {} if self.values else self.equations.definitions
         pairs = in_letters(definitions, self.equations.inverses)
-        weights = (WEIGHTS,) if self.sums else ()
+        weights = {summed.shaft.mark: summed.definition() for summed in self.sums}
         return Block(
             "Derived quantities",
-            (*(self.writer.line(sides(symbol, (law,))) for symbol, law in pairs), *weights),
+            (*(self.writer.line(sides(symbol, (law,))) for symbol, law in pairs), *weights.values()),
             MEANING if weights else "",
         )
 
     @cached_property
-    def sums(self) -> tuple[Sums, ...]:
+    def shafts(self) -> tuple[SpectralShaft, ...]:
         """The shafts whose rows are printed as sums."""
-        return sums_of(self.equations.assembly.quantities, self.writer)
+        return spectral_shafts(self.equations.assembly.quantities)
+
+    @cached_property
+    def sums(self) -> tuple[Sums, ...]:
+        """Their general rows."""
+        return tuple(Sums(shaft, self.writer) for shaft in self.shafts)
+
+    @cached_property
+    def _rows(self) -> Equations:
+        """The equations with the whole torques along these shafts in them, and with h in the inertia of their ends."""
+        form = self.equations.form
+        return kirchhoff(form, compact_assembly(form, self.shafts)) if self.shafts else self.equations
+
+    @property
+    def quantities(self) -> Quantities:
+        """The symbols of these rows."""
+        return self._rows.assembly.quantities
 
     @cached_property
     def inside(self) -> frozenset[int]:
         """The nodes between the ends of these shafts."""
-        return frozenset(node for summed in self.sums for node in summed.inside)
+        return frozenset(node for shaft in self.shafts for node in shaft.inside)
 
     @cached_property
     def twists(self) -> frozenset[int]:
         """The nodes whose speeds are rates of twist of these shafts."""
-        return frozenset(node for summed in self.sums for node in summed.twists)
+        return frozenset(node for shaft in self.shafts for node in shaft.twists)
 
-    def _is_summed(self, row: StateEquation) -> bool:
-        return self.equations.assembly.ends(row.branches[0])[0] in self.inside | self.twists
+    def _ends_of(self, branch: int) -> tuple[int, int]:
+        return self._rows.assembly.ends(branch)
+
+    def _is_summed(self, branch: int) -> bool:
+        return self._ends_of(branch)[0] in self.inside | self.twists
 
     def state(self, *, laws: bool = True) -> Iterator[Block]:
         """Rates of the states, what stands in them, and what was eliminated.
@@ -119,30 +147,31 @@ class Blocks:
         Args:
             laws: print the laws that stand in the rates; not needed below Kirchhoff's equations, which contain them.
         """
-        rows = [row for row in self.equations.states if not self._is_summed(row)]
+        rows = [row for row in self._rows.states if not self._is_summed(row.branches[0])]
         shown = [row.sides if row.explicit and _rates_in(row.coupled.left) <= 1 else row.coupled for row in rows]
         coupled = any(shape is not row.sides for shape, row in zip(shown, rows, strict=True))
         remark = "Rates that stand together on a left side are coupled by inertias or springs." if coupled else ""
         summed = (line for sums in self.sums for line in sums.states())
-        yield Block("State equations", (*map(self.writer.line, shown), *summed), remark)
-        algebraic = [row for row in self.equations.eliminated if row.kind == "algebraic"]
+        yield Block("State equations", (*map(self._line, shown), *summed), remark)
+        algebraic = [row for row in self._rows.eliminated if row.kind == "algebraic"]
         standing = self._laws_in_states() if laws else ()
         yield Block("where", (*standing, *self._lines(algebraic)))
-        dependent = [row for row in self.equations.eliminated if row.kind in ("speed", "torque")]
+        dependent = [row for row in self._rows.eliminated if row.kind in ("speed", "torque")]
         yield Block("Eliminated quantities", tuple(self._explained(dependent)))
 
     def second_order(self) -> Iterator[Block]:
         """M phi'' + D phi' + K phi = T: as matrices where they fit on a page, else row by row."""
-        form = self.equations.second_order
-        size = len(form.coordinates)
-        lines = tuple(self._matrices(form)) if size <= LARGEST_MATRIX else ()
+        graph = self.equations.form.graph
+        along = frozenset(link for shaft in self.shafts for link in shaft.links)
+        form = second_order(graph, self.quantities, along) if along else self.equations.second_order
+        lines = tuple(self._matrices(form)) if len(form.coordinates) <= LARGEST_MATRIX and not along else ()
         if not lines or max(map(_matrix_width, lines)) > LINE_WIDTH:
             lines = tuple(self._motions(form))
         yield Block("Equations of motion", lines)
-        flows = self.equations.assembly.quantities.flows
-        by_symbol = [flow for flow in flows if self.equations.assembly.quantities.through(flow) in form.laws]
+        flows = self.quantities.flows
+        by_symbol = [flow for flow in flows if self.quantities.through(flow) in form.laws]
         laws = [line for flow in by_symbol for line in self.law(flow, form.at.motion)]
-        assembly = self.equations.assembly
+        assembly = self._rows.assembly
         for end, other in assembly.opposite.items():
             across = assembly.quantities.across(assembly.ends(other)).xreplace(form.at.motion)
             laws.append(self.writer.line(assembly.law_of_history(end, across)))
@@ -180,20 +209,25 @@ class Blocks:
         return rf"\begin{{bmatrix}} {inner} \end{{bmatrix}}"
 
     def _motions(self, form: SecondOrder) -> Iterator[Line]:
-        """Row by row; shafts whose ends are coordinates have one row for all inside."""
-        nodes, summed = self.equations.form.graph.nodes, self.summed_between(form.nodes)
-        inside = {nodes[node] for sums in summed for node in sums.inside}
-        yield from (self._motion(form, row) for row, node in enumerate(form.nodes) if node not in inside)
-        for sums in summed:
-            yield from sums.motion()
+        """Row by row; shafts with nodes inside have one row for all of these."""
+        yield from (self._motion(form, row) for row, node in enumerate(form.at.free) if node not in self.inside)
+        for summed in self.sums:
+            yield from summed.motion(form.at.positions)
 
     def summed_between(self, free: Collection[str]) -> tuple[Sums, ...]:
-        """The shafts whose rows are printed as sums in the equations of motion: the nodes at both ends are free."""
+        """The shafts whose rows are printed as sums in Lagrange's equations: the nodes at both ends are free."""
         nodes = self.equations.form.graph.nodes
         return tuple(sums for sums in self.sums if {nodes[sums.part.nodes[end]] for end in ("a", "b")} <= set(free))
 
     def _motion(self, form: SecondOrder, row: int) -> Line:
-        left = self.writer.pieces((FactoredTerms(Integer(1), tuple(map(tidy, form.terms(row)))),))
+        left = list(self.writer.pieces((FactoredTerms(Integer(1), tuple(map(tidy, form.terms(row)))),)))
+        for summed in self.sums:
+            for number, end in summed.shaft.ends:
+                gain = form.at.positions[summed.part.nodes[end]].coeff(form.coordinates[row])
+                if gain != 0:
+                    sign, factor = self.writer.factor(gain)
+                    left += (f"{sign} {factor}{torque}" for torque in summed.elastic(str(number)))
+        left[:1] = [left[0].removeprefix("+ ")]
         force = form.forces[row]
         right = self.writer.pieces(sides(Integer(0), terms_of(force)).groups) or ("0",)
         return Line("", (*left, f"= {right[0]}", *right[1:]), relation="")
@@ -203,20 +237,27 @@ class Blocks:
         """Prints the expressions of this network."""
         names = {**self.equations.symbol_names, **self._auxiliary_names}
         graph = self.equations.form.graph
-        parameters = {letter.name for letter in self.equations.letters if letter.parameter}
+        weights = {name: latex for shaft in self.shafts for name, latex in printed_weights(shaft).items()}
+        sums = [printed_sums(shaft, names) for shaft in self.shafts]
+        names |= {name: latex for of_shaft in (weights, *sums) for name, latex in of_shaft.items()}
+        parameters = {*(letter.name for letter in self.equations.letters if letter.parameter), *weights}
         order = sorted(names, key=lambda name: name not in parameters)
         ordered = with_rates({name: names[name] for name in order}, self.equations.source.rate_of)
         values = self.equations.values if self.values else {}
         printed = {**ordered, **_dotted(self.equations)}
-        angles = map(self.equations.assembly.quantities.angle, range(len(graph.nodes)))
-        last = {name for name in printed if name.startswith("der(")} | {angle.name for angle in angles}
+        angles = map(self.quantities.angle, range(len(graph.nodes)))
+        rates = {name for name in printed if name.startswith("der(")}
+        last = rates | {angle.name for angle in angles} | {name for of_shaft in sums for name in of_shaft}
         return Writer(printed, parameters, last, values, self.equations.inverses)
+
+    def _line(self, row: Sides, remark: str = "") -> Line:
+        return self.writer.line(in_sums(row, self.shafts), remark)
 
     def _lines(self, rows: Iterable[Row]) -> Iterator[Line]:
         seen: dict[str, None] = {}
         for row in rows:
             if not row.trivial:
-                line = self.writer.line(row.sides)
+                line = self._line(row.sides)
                 if line.text not in seen:
                     yield line
                 seen[line.text] = None
@@ -224,15 +265,20 @@ class Blocks:
     def _explained(self, rows: Iterable[Eliminated]) -> Iterator[Line]:
         for row in rows:
             if not row.trivial:
-                yield self.writer.line(row.sides, rf"\text{{({_with_indices(row.why)})}}")
+                yield self._line(row.sides, rf"\text{{({_with_indices(row.why)})}}")
 
     def _laws(self) -> Iterator[Line]:
-        for row in self.equations.laws:
-            flow = self.equations.assembly.quantities.flow_of[row.branches[0]]
-            if row.left == self.equations.assembly.quantities.through(flow):
+        quantities = self.quantities
+        for row in self._rows.laws:
+            if self._is_summed(row.branches[0]):
+                continue
+            flow = quantities.flow_of[row.branches[0]]
+            if row.left == quantities.through(flow):
                 yield from self.law(flow, {})
             elif not row.trivial:
                 yield self.writer.line(self._by_inverse(row.sides))
+        for summed in self.sums:
+            yield from summed.laws()
 
     def _by_inverse(self, row: Sides) -> Sides:
         """The law of a store, with the reciprocal of its coefficient beside the rate where that has the letter."""
@@ -244,7 +290,7 @@ class Blocks:
 
     def _laws_in_states(self) -> Iterator[Line]:
         """Nonlinear laws and sources, in terms of the states."""
-        assembly = self.equations.assembly
+        assembly = self._rows.assembly
         flows = dict.fromkeys(assembly.quantities.flow_of[branch] for branch in sorted(assembly.lumped))
         for flow in flows:
             across = assembly.quantities.across((flow.plus, flow.minus))
@@ -262,13 +308,13 @@ class Blocks:
         """Whether a prescribed across variable stands anywhere by its letter, and not by the sum that it is."""
         if not self.equations.assembly.is_sum(source):
             return True
-        rows = (*self.equations.states, *self.equations.eliminated)
-        letters = self.equations.assembly.quantities.across(self.equations.assembly.ends(source)).free_symbols
+        rows = (*self._rows.states, *self._rows.eliminated)
+        letters = self.quantities.across(self.equations.assembly.ends(source)).free_symbols
         return any(not letters.isdisjoint(row.expression.free_symbols) for row in rows)
 
     def law(self, flow: ThroughQuantity, replaced: Mapping[Expr, Expr]) -> Iterator[Line]:
         """A flow's law, and the letters in it; nothing where the law is a parameter alone."""
-        symbol = self.equations.assembly.quantities.through(flow)
+        symbol = self.quantities.through(flow)
         shared, terms = self._split[flow]
         if terms != (symbol,):
             yield self.writer.line(sides(symbol, (term.xreplace(replaced) for term in terms)))
@@ -278,7 +324,7 @@ class Blocks:
     @cached_property
     def _split(self) -> dict[ThroughQuantity, tuple[tuple[tuple[Symbol, Expr], ...], tuple[Expr, ...]]]:
         """For each flow the letters in its law and the terms that contain them."""
-        assembly = self.equations.assembly
+        assembly = self._rows.assembly
         split = {}
         for number, flow in enumerate(assembly.quantities.flows):
             if any(assembly.kind(branch) is Kind.ACROSS_SOURCE for branch in flow.branches):
@@ -292,7 +338,7 @@ class Blocks:
         taken = {*self.equations.symbol_names.values()}  # only asked for membership
         names: dict[str, str] = {}
         for flow, (shared, _) in self._split.items():
-            through = self.equations.symbol_names[self.equations.assembly.quantities.through(flow).name]
+            through = self.equations.symbol_names[self.quantities.through(flow).name]
             subscript = re.sub(r"^[^_]*", "", through)
             free = iter(letter + subscript for letter in AUXILIARY if letter + subscript not in taken)
             names.update({symbol.name: next(free) for symbol, _ in shared})

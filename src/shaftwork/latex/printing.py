@@ -233,6 +233,13 @@ class Writer:
         text = rf"\left({self.latex(coefficient)}\right)" if coefficient.is_Add else self.latex(coefficient)
         return rf"{text} \, {self.latex(behind[0])}"
 
+    def factor(self, gain: Expr) -> tuple[str, str]:
+        """Sign and size of what stands before a product that is printed already; nothing for a size of 1."""
+        sign = "-" if gain.could_extract_minus_sign() else "+"
+        size = -gain if sign == "-" else gain
+        text = rf"\left({self.latex(size)}\right)" if size.is_Add else self.latex(size)
+        return sign, "" if size == 1 else rf"{text} \, "
+
     def _signed(self, term: Expr) -> str:
         text = self._product(term)
         return f"- {text[1:].lstrip()}" if text.startswith("-") else f"+ {text}"
