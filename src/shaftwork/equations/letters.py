@@ -48,6 +48,7 @@ class Named:
             stem, index = split_index(str(self.chosen))  # `symbol=1` is a fair choice, and printing never fails
             return f"{chosen_subscript(stem)}{indexed(index)}"
         stem, index = split_index(self.name)
+        stem = stem.rstrip() if index else stem  # "mesh 1" is mesh, 1
         comma = "" if style and stem.endswith("_") else ","
         if style == 0:
             stem = self._short(stem, index)
@@ -171,7 +172,8 @@ def _branch_letters(quantities: Quantities, branch: GraphBranch) -> Iterator[Let
         quantity = quantities.domain((branch.plus, branch.minus)).integral
         symbol = quantities.integral(branch.index)
         _, _, label = symbol.name.partition(f".{quantity.name}_")
-        yield _letter(symbol, quantity, label)
+        place = _between(quantities.graph.part_of(branch.index), branch.plus, branch.minus)
+        yield replace(_letter(symbol, quantity, label), place=place)
     if branch.template.is_history:
         line, _, end = branch.template.label.partition("_")
         meaning = f"torque wave that arrives at {end}"
@@ -181,7 +183,8 @@ def _branch_letters(quantities: Quantities, branch: GraphBranch) -> Iterator[Let
         quantity = quantities.multiplier_quantity(branch.index)
         letter = _letter(quantities.multiplier(branch.index), quantity, quantities.multiplier_label(branch.index))
         holds = _numbered(quantities, branch)
-        letter = replace(letter, place="that its coupling transmits")
+        through = "" if letter.number else _between(quantities.graph.part_of(branch.index), *branch.terms[0][1:])
+        letter = replace(letter, place=f"that its coupling transmits {through}".rstrip())
         yield replace(letter, meaning=f"{letter.meaning} that holds it") if holds else letter
 
 
@@ -203,7 +206,8 @@ def _node_letters(quantities: Quantities) -> Iterator[tuple[int, Letter]]:
         domain, (stem, digits) = graph.domains[node], split_index(port)
         for symbol, quantity in ((quantities.node(node), domain.across), (quantities.angle(node), domain.integral)):
             letter = _letter(symbol, quantity, f"{stem}_{digits}")
-            yield part, replace(letter, meaning=f"{letter.meaning} of {stem}" if stem else letter.meaning)
+            words = " ".join(stem.split("_"))
+            yield part, replace(letter, meaning=f"{letter.meaning} of {words}" if words else letter.meaning)
 
 
 def _between(part: GraphPart, plus: int, minus: int) -> str:

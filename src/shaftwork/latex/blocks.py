@@ -16,14 +16,16 @@ from shaftwork.core.domains import ELECTRICAL, ROTATION, TRANSLATION
 from shaftwork.core.errors import CompileError
 from shaftwork.equations.assembly import FactoredTerms, Sides, sides, terms_of, tidy
 from shaftwork.equations.notations import in_letters
+from shaftwork.equations.dimensions import unit_of
 from shaftwork.equations.kirchhoff import kirchhoff
 from shaftwork.equations.quantities import Quantities, ThroughQuantity, rate_of
 from shaftwork.equations.second_order import SecondOrder, second_order
 from shaftwork.equations.spelling import INDEX_CLOSES, INDEX_OPENS, in_text
 from shaftwork.latex.compact_rows import SpectralShaft, compact_assembly, in_sums, spectral_shafts
 from shaftwork.latex.field_lines import lines_of_field
+from shaftwork.latex.nomenclature import Cells, breakable, unit
 from shaftwork.latex.printing import LINE_WIDTH, Line, Writer, printed_width, with_rates
-from shaftwork.latex.shaft_sums import MEANING, Sums, printed_sums, printed_weights
+from shaftwork.latex.shaft_sums import MEANING, Sums, printed_sums, printed_weights, rows_of_sums
 from shaftwork.network.kinds import Kind
 
 if TYPE_CHECKING:
@@ -32,8 +34,7 @@ if TYPE_CHECKING:
 
 AUXILIARY = (r"\sigma", r"\zeta", r"\xi", r"\chi")
 """Letters for sums that occur more than once in a law, such as a slip."""
-LARGEST_MATRIX = 6
-"""Coordinates up to which the second-order form is printed as matrices."""
+ORDINALS = ("first", "second", "third")
 SHORTEST_SHARED = 3
 """Operations in a sum from which on it is worth a letter of its own."""
 BALANCES = {ROTATION: "torques", TRANSLATION: "forces", ELECTRICAL: "currents"}
@@ -68,20 +69,20 @@ class Blocks:
         """
         domains = dict.fromkeys(self.equations.form.graph.domains)
         balanced = " and ".join(", ".join(BALANCES[domain] for domain in domains).rsplit(", ", 1))
-        nodes = [row for number, row in enumerate(self._rows.nodes) if number not in self.inside | self.twists]
+        nodes = [row for number, row in enumerate(self.rows.nodes) if number not in self.inside | self.twists]
         balances = (summed.balance() for summed in self.sums)
         yield Block(f"Balance of {balanced} at the nodes", (*self._lines(nodes), *balances))
-        loops = [row for row in self._rows.loops if self._ends_of(row.link)[0] not in self.twists]
+        loops = [row for row in self.rows.loops if self._ends_of(row.link)[0] not in self.twists]
         rates = (line for summed in self.sums for line in summed.loops())
         yield Block("Speeds around the loops", (*self._lines(loops), *rates))
         lossy = any(branch.template.through for branch in self.equations.form.graph.branches)
         yield Block("Couplings" if lossy else "Ideal couplings", tuple(self._lines(self._couplings())))
-        integrals = [row for row in self._rows.states if row.name in self._integrals] if twists else []
+        integrals = [row for row in self.rows.states if row.name in self._integrals] if twists else []
         yield Block("Laws of the parts", (*self._laws(), *self._lines(integrals)))
 
     def _couplings(self) -> Iterator[Row]:
         """The couplings that say what no loop says."""
-        rows = self._rows
+        rows = self.rows
         around = {_to_rounding(row.expression) for row in rows.loops}  # only asked for membership
         along = {branch for shaft in self.shafts for branch in shaft.couplings}  # so is this
         for row in rows.couplings:
@@ -92,6 +93,29 @@ class Blocks:
     @cached_property
     def _integrals(self) -> frozenset[str]:
         return frozenset(state.name for state in self.equations.form.states if state.kind == "integral")
+
+    @property
+    def used(self) -> tuple[str, ...]:
+        """The names of the quantities in all that has been printed so far, without rates and sums."""
+        used = dict.fromkeys(map(_without_rate, self.writer.used))
+        for family in (family for shaft in self.shafts for family in shaft.families):
+            if any(symbol.name in used for symbol in family):
+                used.update(dict.fromkeys(str(symbol.name) for symbol in family))
+        return tuple(used)
+
+    def helpers(self) -> Iterator[Cells]:
+        """Rows of a nomenclature: letters for sums in laws that have been printed so far, and for weights."""
+        units = {letter.name: letter.unit for letter in self.equations.letters}
+        graph = self.equations.form.graph
+        for flow, (shared, _) in self._split.items():
+            of = f"in the law of ${self.equations.symbol_names[self.quantities.through(flow).name]}$"
+            for ordinal, (letter, total) in zip(ORDINALS, shared, strict=False):
+                units[letter.name] = unit_of(total, units)
+                if letter.name in self.writer.used:
+                    which = f"{ordinal} sum" if len(shared) > 1 else "sum"
+                    name, owner = self._auxiliary_names[letter.name], breakable(graph.parts[flow.part].name)
+                    yield f"${name}$", f"{which} {of}", owner, unit(units[letter.name])
+        yield from rows_of_sums(self.sums, self.used)
 
     def derived(self) -> Block:
         """The definitions of the letters that stand for several parameters; nothing where numbers are printed."""
@@ -115,7 +139,7 @@ class Blocks:
         return tuple(Sums(shaft, self.writer) for shaft in self.shafts)
 
     @cached_property
-    def _rows(self) -> Equations:
+    def rows(self) -> Equations:
         """The equations with the whole torques along these shafts in them, and with h in the inertia of their ends."""
         form = self.equations.form
         return kirchhoff(form, compact_assembly(form, self.shafts)) if self.shafts else self.equations
@@ -123,7 +147,7 @@ class Blocks:
     @property
     def quantities(self) -> Quantities:
         """The symbols of these rows."""
-        return self._rows.assembly.quantities
+        return self.rows.assembly.quantities
 
     @cached_property
     def inside(self) -> frozenset[int]:
@@ -136,7 +160,7 @@ class Blocks:
         return frozenset(node for shaft in self.shafts for node in shaft.twists)
 
     def _ends_of(self, branch: int) -> tuple[int, int]:
-        return self._rows.assembly.ends(branch)
+        return self.rows.assembly.ends(branch)
 
     def _is_summed(self, branch: int) -> bool:
         return self._ends_of(branch)[0] in self.inside | self.twists
@@ -147,35 +171,17 @@ class Blocks:
         Args:
             laws: print the laws that stand in the rates; not needed below Kirchhoff's equations, which contain them.
         """
-        rows = [row for row in self._rows.states if not self._is_summed(row.branches[0])]
+        rows = [row for row in self.rows.states if not self._is_summed(row.branches[0])]
         shown = [row.sides if row.explicit and _rates_in(row.coupled.left) <= 1 else row.coupled for row in rows]
         coupled = any(shape is not row.sides for shape, row in zip(shown, rows, strict=True))
         remark = "Rates that stand together on a left side are coupled by inertias or springs." if coupled else ""
         summed = (line for sums in self.sums for line in sums.states())
         yield Block("State equations", (*map(self._line, shown), *summed), remark)
-        algebraic = [row for row in self._rows.eliminated if row.kind == "algebraic"]
+        algebraic = [row for row in self.rows.eliminated if row.kind == "algebraic"]
         standing = self._laws_in_states() if laws else ()
         yield Block("where", (*standing, *self._lines(algebraic)))
-        dependent = [row for row in self._rows.eliminated if row.kind in ("speed", "torque")]
+        dependent = [row for row in self.rows.eliminated if row.kind in ("speed", "torque")]
         yield Block("Eliminated quantities", tuple(self._explained(dependent)))
-
-    def second_order(self) -> Iterator[Block]:
-        """M phi'' + D phi' + K phi = T: as matrices where they fit on a page, else row by row."""
-        graph = self.equations.form.graph
-        along = frozenset(link for shaft in self.shafts for link in shaft.links)
-        form = second_order(graph, self.quantities, along) if along else self.equations.second_order
-        lines = tuple(self._matrices(form)) if len(form.coordinates) <= LARGEST_MATRIX and not along else ()
-        if not lines or max(map(_matrix_width, lines)) > LINE_WIDTH:
-            lines = tuple(self._motions(form))
-        yield Block("Equations of motion", lines)
-        flows = self.quantities.flows
-        by_symbol = [flow for flow in flows if self.quantities.through(flow) in form.laws]
-        laws = [line for flow in by_symbol for line in self.law(flow, form.at.motion)]
-        assembly = self._rows.assembly
-        for end, other in assembly.opposite.items():
-            across = assembly.quantities.across(assembly.ends(other)).xreplace(form.at.motion)
-            laws.append(self.writer.line(assembly.law_of_history(end, across)))
-        yield Block("where", tuple(laws), r"Angles are counted from the untwisted position.")
 
     def fields(self) -> Iterator[Block]:
         """Long shafts before they are divided.
@@ -191,46 +197,10 @@ class Blocks:
             yield Block("At its ends", boundary)
             yield Block("Derived quantities", definitions)
 
-    def _matrices(self, form: SecondOrder) -> Iterator[Line]:
-        yield Line(
-            r"\mathbf{M} \, \ddot{\mathbf{q}} + \mathbf{D} \, \dot{\mathbf{q}} + \mathbf{K} \, \mathbf{q}",
-            (r"\mathbf{T}",),
-        )
-        size = range(len(form.coordinates))
-        transposed = " & ".join(map(self.writer.latex, form.coordinates))
-        yield Line(r"\mathbf{q}", (rf"\begin{{bmatrix}} {transposed} \end{{bmatrix}}^{{\mathsf{{T}}}}",))
-        for name, entries in (("M", form.mass), ("D", form.damping), ("K", form.stiffness)):
-            rows = ([entries.get((i, j), Integer(0)) for j in size] for i in size)
-            yield Line(rf"\mathbf{{{name}}}", (self._matrix(rows),))
-        yield Line(r"\mathbf{T}", (self._matrix([force] for force in form.forces),))
-
-    def _matrix(self, rows: Iterable[Iterable[Expr]]) -> str:
-        inner = r" \\ ".join(" & ".join(self.writer.latex(tidy(entry)) for entry in row) for row in rows)
-        return rf"\begin{{bmatrix}} {inner} \end{{bmatrix}}"
-
-    def _motions(self, form: SecondOrder) -> Iterator[Line]:
-        """Row by row; shafts with nodes inside have one row for all of these."""
-        yield from (self._motion(form, row) for row, node in enumerate(form.at.free) if node not in self.inside)
-        for summed in self.sums:
-            yield from summed.motion(form.at.positions)
-
     def summed_between(self, free: Collection[str]) -> tuple[Sums, ...]:
         """The shafts whose rows are printed as sums in Lagrange's equations: the nodes at both ends are free."""
         nodes = self.equations.form.graph.nodes
         return tuple(sums for sums in self.sums if {nodes[sums.part.nodes[end]] for end in ("a", "b")} <= set(free))
-
-    def _motion(self, form: SecondOrder, row: int) -> Line:
-        left = list(self.writer.pieces((FactoredTerms(Integer(1), tuple(map(tidy, form.terms(row)))),)))
-        for summed in self.sums:
-            for number, end in summed.shaft.ends:
-                gain = form.at.positions[summed.part.nodes[end]].coeff(form.coordinates[row])
-                if gain != 0:
-                    sign, factor = self.writer.factor(gain)
-                    left += (f"{sign} {factor}{torque}" for torque in summed.elastic(str(number)))
-        left[:1] = [left[0].removeprefix("+ ")]
-        force = form.forces[row]
-        right = self.writer.pieces(sides(Integer(0), terms_of(force)).groups) or ("0",)
-        return Line("", (*left, f"= {right[0]}", *right[1:]), relation="")
 
     @cached_property
     def writer(self) -> Writer:
@@ -269,7 +239,7 @@ class Blocks:
 
     def _laws(self) -> Iterator[Line]:
         quantities = self.quantities
-        for row in self._rows.laws:
+        for row in self.rows.laws:
             if self._is_summed(row.branches[0]):
                 continue
             flow = quantities.flow_of[row.branches[0]]
@@ -290,7 +260,7 @@ class Blocks:
 
     def _laws_in_states(self) -> Iterator[Line]:
         """Nonlinear laws and sources, in terms of the states."""
-        assembly = self._rows.assembly
+        assembly = self.rows.assembly
         flows = dict.fromkeys(assembly.quantities.flow_of[branch] for branch in sorted(assembly.lumped))
         for flow in flows:
             across = assembly.quantities.across((flow.plus, flow.minus))
@@ -308,7 +278,7 @@ class Blocks:
         """Whether a prescribed across variable stands anywhere by its letter, and not by the sum that it is."""
         if not self.equations.assembly.is_sum(source):
             return True
-        rows = (*self._rows.states, *self._rows.eliminated)
+        rows = (*self.rows.states, *self.rows.eliminated)
         letters = self.quantities.across(self.equations.assembly.ends(source)).free_symbols
         return any(not letters.isdisjoint(row.expression.free_symbols) for row in rows)
 
@@ -324,7 +294,7 @@ class Blocks:
     @cached_property
     def _split(self) -> dict[ThroughQuantity, tuple[tuple[tuple[Symbol, Expr], ...], tuple[Expr, ...]]]:
         """For each flow the letters in its law and the terms that contain them."""
-        assembly = self._rows.assembly
+        assembly = self.rows.assembly
         split = {}
         for number, flow in enumerate(assembly.quantities.flows):
             if any(assembly.kind(branch) is Kind.ACROSS_SOURCE for branch in flow.branches):
@@ -343,6 +313,13 @@ class Blocks:
             free = iter(letter + subscript for letter in AUXILIARY if letter + subscript not in taken)
             names.update({symbol.name: next(free) for symbol, _ in shared})
         return names
+
+
+def _without_rate(name: str) -> str:
+    """The name of a quantity by that of its rate or of the rate of that."""
+    while name.startswith("der("):
+        name = name[4:-1]
+    return name
 
 
 def _rates_in(left: Expr) -> int:
@@ -378,13 +355,6 @@ def _dotted(equations: Equations) -> dict[str, str]:
         dotted[velocity.name] = rf"\dot{{{letter}}}{underscore}{subscript}"
         dotted[rate_of(velocity).name] = rf"\ddot{{{letter}}}{underscore}{subscript}"
     return dotted
-
-
-def _matrix_width(line: Line) -> float:
-    """Width of a matrix: that of its columns, and the room between them."""
-    rows = (row.split("&") for row in line.pieces[0].split(r"\\"))
-    columns = list(zip_longest(*rows, fillvalue=""))
-    return sum(max(map(printed_width, column)) for column in columns) + 1.8 * (len(columns) - 1) + 2.0
 
 
 def _with_indices(sentence: str) -> str:

@@ -83,6 +83,15 @@ class SpectralShaft:
         """The branches that say what the rates of twist are."""
         return tuple(k for k in self.part.branches if self.quantities.graph.branches[k].terms)
 
+    @cached_property
+    def families(self) -> tuple[tuple[Symbol, ...], ...]:
+        """The quantities that differ by a running number: all of a family stand where one of them is printed."""
+        nodes = [self.part.nodes[str(j)] for j in range(1, self.degree)]
+        twists = tuple(self.quantities.node(self.part.nodes[f"twist{k}"]) for k in range(self.degree))
+        sums = tuple(self.sum_at(number) for number, _ in self.ends)
+        speeds, angles = (tuple(map(of, nodes)) for of in (self.quantities.node, self.quantities.angle))
+        return (speeds, angles, twists, self.stores, (*self.torques, *sums))
+
     def sum_at(self, end: int) -> Symbol:
         """Stands for sum_k w_{k,j} tau_k."""
         return Symbol(f"{self.part.name}, sum at {end}", real=True)

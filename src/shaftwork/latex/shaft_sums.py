@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from sympy import Expr, Integer, Mul, Symbol
 
+from shaftwork.core.domains import ROTATION, Quantity
+from shaftwork.equations.letters import WORDS
 from shaftwork.equations.quantities import Quantities, rate_of
-from shaftwork.equations.spelling import INDEX_CLOSES, INDEX_OPENS
+from shaftwork.equations.spelling import INDEX_CLOSES, INDEX_OPENS, in_text
 from shaftwork.latex.compact_rows import SpectralShaft
+from shaftwork.latex.nomenclature import Cells, unit
 from shaftwork.latex.printing import Line, Writer
 from shaftwork.network.graph import GraphPart
 
@@ -143,6 +146,12 @@ class Sums:
         for number, end in self.shaft.ends:
             yield Line(self._speed(str(number)), (self.writer.latex(self._quantities.node(self.part.nodes[end])),))
 
+    def of_ends(self, used: Collection[str]) -> Iterator[tuple[str, Quantity]]:
+        """What speeds and angles of the ends are called in sums, where these are printed."""
+        for symbol, quantity in ((self._inner, ROTATION.across), (self._angle, ROTATION.integral)):
+            if symbol.name in used:
+                yield ", ".join(f"${self._indexed(symbol, str(number))}$" for number, _ in self.shaft.ends), quantity
+
     @property
     def _angle(self) -> Symbol:
         return self._quantities.angle(self.part.nodes["1"])
@@ -212,6 +221,27 @@ class Sums:
         """A quotient of products of parameters, by symbol or value, over a weight."""
         symbols = [[self._quantities.graph.symbol_of(self.part, name) for name in names] for names in (above, below)]
         return self.writer.latex(Mul(*symbols[0]) / (Mul(*symbols[1]) * weight))
+
+
+def rows_of_sums(sums: Sequence[Sums], used: Collection[str]) -> Iterator[Cells]:
+    """Rows of a nomenclature: what the ends are called in sums, and the weights.
+
+    Args:
+        sums: the shafts that are printed as sums.
+        used: names of the quantities that are printed.
+    """
+    for each in sums:
+        for name, size in each.of_ends(used):
+            yield name, f"{WORDS[size.name]} at its ends, within sums", in_text(each.part.name), unit(size.unit)
+    mark = sums[0].shaft.mark and "^{(n)}" if sums else ""
+    weights = {
+        f"w{mark}_{{k,j}}": r"weight of node $j$ in the twist at point $k$",
+        f"h{mark}_{{j}}": "weight of node $j$ in quadrature after Gauss and Lobatto",
+        rf"\lambda{mark}_{{k}}": "weight of point $k$ in quadrature after Gauss",
+        f"y{mark}_{{k}}": "point $k$ of Gauss, from 0 to 1",
+        rf"\ell{mark}_{{j}}": "Lagrange polynomial of node $j$",
+    }
+    yield from ((f"${letter}$", meaning, "spectral shafts", "--") for letter, meaning in weights.items() if sums)
 
 
 def printed_weights(shaft: SpectralShaft) -> dict[str, str]:
