@@ -7,29 +7,27 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import zip_longest
 from typing import TYPE_CHECKING
 
-from sympy import Add, Expr, Float, Integer, Symbol, preorder_traversal
+from sympy import Add, Expr, Float, Symbol, preorder_traversal
 
 from shaftwork.core.domains import ELECTRICAL, ROTATION, TRANSLATION
 from shaftwork.core.errors import CompileError
-from shaftwork.equations.assembly import FactoredTerms, Sides, sides, terms_of, tidy
-from shaftwork.equations.notations import in_letters
+from shaftwork.equations.assembly import Sides, sides, terms_of
 from shaftwork.equations.dimensions import unit_of
 from shaftwork.equations.kirchhoff import kirchhoff
+from shaftwork.equations.notations import in_letters
 from shaftwork.equations.quantities import Quantities, ThroughQuantity, rate_of
-from shaftwork.equations.second_order import SecondOrder, second_order
 from shaftwork.equations.spelling import INDEX_CLOSES, INDEX_OPENS, in_text
 from shaftwork.latex.compact_rows import SpectralShaft, compact_assembly, in_sums, spectral_shafts
 from shaftwork.latex.field_lines import lines_of_field
 from shaftwork.latex.nomenclature import Cells, breakable, unit
-from shaftwork.latex.printing import LINE_WIDTH, Line, Writer, printed_width, with_rates
+from shaftwork.latex.printing import Line, Writer, with_rates
 from shaftwork.latex.shaft_sums import MEANING, Sums, printed_sums, printed_weights, rows_of_sums
 from shaftwork.network.kinds import Kind
 
 if TYPE_CHECKING:
-    from shaftwork.equations.kirchhoff import Eliminated, Row, StateEquation
+    from shaftwork.equations.kirchhoff import Eliminated, Row
     from shaftwork.equations.records import Equations
 
 AUXILIARY = (r"\sigma", r"\zeta", r"\xi", r"\chi")

@@ -128,7 +128,8 @@ def document(equations: Equations, form: Form | None, *, values: bool, title: st
             why = "the network has electrical nodes." if electrical else str(reason).removesuffix(INSTEAD)
             remarks = (f"There is no second-order form: {why}",)
     else:
-        sections = {TITLES[form]: section(printed_blocks(blocks, form))}
+        printed = printed_blocks(blocks, form)
+        sections = {TITLES[form]: section(printed)}
     matrices = motions.helpers() if TITLES["second-order"] in sections else ()
     helpers = (*blocks.helpers(), *matrices)
     sections["Nomenclature"] = nomenclature(equations, {*blocks.used, *states}, states, helpers=helpers)

@@ -145,9 +145,7 @@ class Writer:
         self._symbol_names = {**printed, TIME: "t"}
         self.used: dict[str, None] = {}
         """The names of all symbols that have been printed, in their order."""
-        self._printer = _Printer(
-            {"symbol_names": self._symbol_names, "mul_symbol": r" \, ", "inv_trig_style": "full"}
-        )
+        self._printer = _Printer({"symbol_names": self._symbol_names, "mul_symbol": r" \, ", "inv_trig_style": "full"})
 
     def latex(self, expression: Expr) -> str:
         """An expression in LaTeX."""

@@ -67,11 +67,7 @@ class Sums:
 
     def laws(self) -> Iterator[Line]:
         """The torques by the rates of twist."""
-        if self._damped:
-            damping = rf"+ {self._shown('damping', below=('length',), weight=self.shaft.weight)} \, {self._rate_of_twist}"
-            yield Line(self._torque, (self._store, damping), self._along)
-        stiffness = self._shown("line_stiffness", below=("length",), weight=self.shaft.weight)
-        yield Line(self._rate_of_store, (rf"{stiffness} \, {self._rate_of_twist}",), self._along)
+        yield from self._along_it(self._rate_of_twist)
 
     def states(self) -> Iterator[Line]:
         """The rates of the speeds and torques inside."""
@@ -79,12 +75,17 @@ class Sums:
         bearing = (rf"- {self._shown('friction', below=('line_inertia',))} \, {self._speed('j')}",)
         pieces = (rf"- {driven} \, {self._driving}", *(bearing if self._has("friction") else ()))
         yield Line(self._indexed(rate_of(self._inner), "j"), pieces, self._inside)
-        stiffness = self._shown("line_stiffness", below=("length",), weight=self.shaft.weight)
-        yield Line(self._rate_of_store, (rf"{stiffness} \, {self._twist}",), self._along)
-        if self._damped:
-            damping = rf"+ {self._shown('damping', below=('length',), weight=self.shaft.weight)} \, {self._twist}"
-            yield Line(self._torque, (self._store, damping), self._along)
+        yield from self._along_it(self._twist)
         yield from self._ends()
+
+    def _along_it(self, twist: str) -> Iterator[Line]:
+        """The torques by the rates of twist."""
+        stiffness, damping = (
+            self._shown(name, below=("length",), weight=self.shaft.weight) for name in ("line_stiffness", "damping")
+        )
+        yield Line(self._rate_of_store, (rf"{stiffness} \, {twist}",), self._along)
+        if self._damped:
+            yield Line(self._torque, (self._store, rf"+ {damping} \, {twist}"), self._along)
 
     def motion(self, positions: Mapping[int, Expr] | None = None) -> Iterator[Line]:
         """The rows of the second-order form inside, and what the angles of the ends are called in them.
