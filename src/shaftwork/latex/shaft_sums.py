@@ -266,4 +266,6 @@ def printed_sums(shaft: SpectralShaft, names: Mapping[str, str]) -> dict[str, st
 
 
 def _range(index: str, first: int, last: int) -> str:
-    return rf"\text{{for }} {index} = {first}, \dots, {last}"
+    numbers = range(first, last + 1)
+    shown = map(str, numbers) if len(numbers) <= 3 else (str(first), r"\dots", str(last))
+    return rf"\text{{for }} {index} = {', '.join(shown)}"
