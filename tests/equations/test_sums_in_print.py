@@ -221,11 +221,15 @@ def test_the_printed_second_order_form_is_that_of_the_matrices() -> None:
         symbol = form.at.positions[node]
         for _ in range(latex.count("dot") and (2 if "ddot" in latex else 1)):
             symbol = form.at.rate(symbol)
-        printed[latex] = float(symbol.xreplace({s: _number(equations, s, printed, symbols) for s in symbol.free_symbols}))
+        printed[latex] = float(
+            symbol.xreplace({s: _number(equations, s, printed, symbols) for s in symbol.free_symbols})
+        )
     outer = [k for k, name in enumerate(form.nodes) if not name.startswith("x.")]
     assert len(ends) == len(outer) == 2
     for row, (left, _, right) in zip(outer, ends, strict=True):
-        expected = sum(float(term.xreplace(symbols)) for term in form.terms(row)) - float(form.forces[row].xreplace(symbols))
+        expected = sum(float(term.xreplace(symbols)) for term in form.terms(row)) - float(
+            form.forces[row].xreplace(symbols)
+        )
         assert read(left, printed) - read(right, printed) == pytest.approx(expected, rel=1e-9)
 
 

@@ -183,6 +183,7 @@ def kirchhoff(form: StateForm, assembly: Assembly | None = None) -> Equations:
         tuple(writer.states()),
         tuple(writer.eliminated()),
         tuple(writer.notes()),
+        from_assembly=partial(kirchhoff, form),
     )
 
 

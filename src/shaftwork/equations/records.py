@@ -87,6 +87,7 @@ class Equations:
         phase: the mode of every part that changes its mode, "gap open, load stuck", for which the rows hold.
         source: whose letters are printed.
         in_phase: from a phase to the equations there, where parts change their mode.
+        from_assembly: the same rows by another assembly.
     """
 
     form: StateForm
@@ -101,6 +102,7 @@ class Equations:
     phase: str = field(default="", kw_only=True)
     source: Notation = field(default=OWN, kw_only=True)
     in_phase: Callable[[str | NamedPhase], Equations] | None = None
+    from_assembly: Callable[[Assembly], Equations] = field(kw_only=True)
 
     @cached_property
     def _letters(self) -> tuple[Mapping[str, str], tuple[Letter, ...]]:

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 from sympy import Add, Expr, Float, Symbol, preorder_traversal
 
+from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.domains import ELECTRICAL, ROTATION, TRANSLATION
 from shaftwork.core.errors import CompileError
 from shaftwork.equations.assembly import Sides, sides, terms_of
 from shaftwork.equations.dimensions import unit_of
-from shaftwork.equations.kirchhoff import kirchhoff
 from shaftwork.equations.notations import in_letters
 from shaftwork.equations.quantities import Quantities, ThroughQuantity, rate_of
 from shaftwork.equations.spelling import INDEX_CLOSES, INDEX_OPENS, in_text
@@ -113,6 +113,9 @@ class Blocks:
                     which = f"{ordinal} sum" if len(shared) > 1 else "sum"
                     name, owner = self._auxiliary_names[letter.name], breakable(graph.parts[flow.part].name)
                     yield f"${name}$", f"{which} {of}", owner, unit(units[letter.name])
+            noises = (noise for term in self._split[flow][1] for noise in term.atoms(HeldNoise, SmoothNoise))
+            for name in sorted({self.writer.latex(noise).partition(r"\left(")[0] for noise in noises}):
+                yield f"${name}$", "function with random values", breakable(graph.parts[flow.part].name), "--"
         yield from rows_of_sums(self.sums, self.used)
 
     def derived(self) -> Block:
@@ -139,8 +142,9 @@ class Blocks:
     @cached_property
     def rows(self) -> Equations:
         """The equations with the whole torques along these shafts in them, and with h in the inertia of their ends."""
-        form = self.equations.form
-        return kirchhoff(form, compact_assembly(form, self.shafts)) if self.shafts else self.equations
+        if not self.shafts:
+            return self.equations
+        return self.equations.from_assembly(compact_assembly(self.equations.form, self.shafts))
 
     @property
     def quantities(self) -> Quantities:
