@@ -58,12 +58,12 @@ def test_what_arrives_is_written_in_the_states() -> None:
 
 def test_the_waves_of_both_halves_have_letters_and_words_of_their_own() -> None:
     document = drive(sw.Wave(), friction=0.3).equations().document()
-    for letter, end in ((r"a,\mathrm{line},1", "a"), (r"\mathrm{middle},\mathrm{line},2", "middle")):
+    for letter, end in ((r"a,\mathrm{line},1", "a"), (r"\mathrm{middle},\mathrm{line},2", r"middle, no.\ 2")):
         assert f"$h_{{{letter}}}$ & torque wave that arrives at {end} & line" in document
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("model", [sw.CentralDifference(80), sw.Spectral(5)], ids=repr)
+@pytest.mark.parametrize("model", [sw.CentralDifference(80), sw.CentralDifference(20)], ids=repr)
 def test_rates_of_twist_are_defined_once_and_not_called_nodes(model: object) -> None:
     equations = drive(model, damping=0.05).equations()
     document = equations.document()
@@ -95,10 +95,11 @@ def test_a_shaft_of_high_degree_is_printed_as_sums(losses: dict[str, float]) -> 
     small = drive(sw.Spectral(16), **losses).equations()
     state = small.latex(form="state")
     for row in (
-        r"h_{j} \, \frac{d \omega_{\mathrm{line},j}}{d t} &= - \frac{1}{L_{\mathrm{line}} \, J'_{\mathrm{line}}} \,"
+        r"\frac{d \omega_{\mathrm{line},j}}{d t} &= - \frac{1}{L_{\mathrm{line}} \, J'_{\mathrm{line}} \, h_{j}} \,"
         r" \sum_{k = 0}^{15} w_{k,j} \, \tau_{" + (r"\mathrm{total}," if losses else "") + r"\mathrm{line},k}",
-        r"\lambda_{k} \, \frac{d \tau_{" + ("c," if losses else "") + r"\mathrm{line},k}}{d t} &= "
-        r"\frac{C'_{\mathrm{line}}}{L_{\mathrm{line}}} \, \sum_{j = 0}^{16} w_{k,j} \, \omega_{\mathrm{line},j}",
+        r"\frac{d \tau_{" + ("c," if losses else "") + r"\mathrm{line},k}}{d t} &= "
+        r"\frac{C'_{\mathrm{line}}}{L_{\mathrm{line}} \, \lambda_{k}} \, "
+        r"\sum_{j = 0}^{16} w_{k,j} \, \omega_{\mathrm{line},j}",
         r"\omega_{\mathrm{line},16} &= \omega_{b,\mathrm{line}}",
         r"w_{k,j} &= - \lambda_{k} \, \ell_{j}'(y_{k})",
     ):
@@ -130,7 +131,7 @@ def test_sums_are_printed_by_value_too_and_in_the_second_order_form(values: bool
     net.add(sw.TorqueSource("drive", tau=12.7), "m")
     net.add(sw.Shaft("line", length=2.0, diameter=0.02, damping=0.1, model=sw.Spectral(16)), "m", "x")
     text = net.equations().latex(form="second-order", values=values)
-    assert text.count(r"\sum_{i = 0}^{16} w_{k,i} \, \varphi_{\mathrm{line},i}") == 1
+    assert text.count(r"\sum_{i = 0}^{16} w_{k,i} \, \varphi_{\mathrm{line},i}") == 3  # at both ends and inside
     assert (r"622.821 \sum" in text) == values
     assert r"\ddot{\varphi}_{\mathrm{line},3}" not in text
 

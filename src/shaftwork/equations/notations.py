@@ -34,6 +34,7 @@ class Letter:
         parameter: whether it is a parameter, with a value.
         owner: name of the part or node that it belongs to.
         number: running number within the part.
+        place: where within the part, in words, for parts with several quantities of one meaning.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Letter:
     parameter: bool = False
     owner: str = ""
     number: str = ""
+    place: str = ""
 
     def printed(self, subscript: str) -> str:
         """The symbol in LaTeX."""

@@ -84,6 +84,7 @@ class Equations:
         phase: the mode of every part that changes its mode, "gap open, load stuck", for which the rows hold.
         notation: whose letters are printed.
         in_phase: from a phase to the equations there, where parts change their mode.
+        from_assembly: the same rows by another assembly.
     """
 
     form: StateForm
@@ -98,6 +99,7 @@ class Equations:
     phase: str = field(default="", kw_only=True)
     notation: Notation = field(default=OWN, kw_only=True)
     in_phase: Callable[[str | NamedPhase], Equations] | None = None
+    from_assembly: Callable[[Assembly], Equations] = field(kw_only=True)
 
     @cached_property
     def _letters(self) -> tuple[Mapping[str, str], tuple[Letter, ...]]:
@@ -325,18 +327,28 @@ class Equations:
     __repr__ = __str__
 
     def document(
-        self, form: Form | None = None, *, values: bool = False, notation: str | Notation | None = None
+        self,
+        form: Form | None = None,
+        *,
+        values: bool = False,
+        notation: str | Notation | None = None,
+        title: str | None = None,
     ) -> str:
         """A complete LaTeX document: the forms, the states with their units, and the nomenclature with the values.
 
         Args:
-            form: as in `latex`; by default all.
+            form: as in `latex`; by default all that the network has.
             values: print the parameters' values instead of their symbols.
             notation: letters of another source, as in `written_as`.
+            title: of the document; by default the name of the network.
+
+        Raises:
+            CompileError: there is no such form of this network, as for `latex`.
+            ParameterError: there is no such notation.
         """
         from shaftwork.latex.document import document
 
-        return document(self.written_as(notation), form, values=values)
+        return document(self.written_as(notation), form, values=values, title=title)
 
     def _repr_latex_(self) -> str:
         from shaftwork.latex.document import blocks_of, rendered

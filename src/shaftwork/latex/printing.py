@@ -141,11 +141,15 @@ class Writer:
         self._parameters = {Symbol(name, real=True) for name in parameters}
         self._sums: dict[Expr, Symbol] = {}
         self._symbol_names = {**printed, TIME: "t"}
-        self._printer = _Printer({"symbol_names": self._symbol_names, "mul_symbol": r" \, "})
+        self.used: dict[str, None] = {}
+        """The names of all symbols that have been printed, in their order."""
+        self._printer = _Printer({"symbol_names": self._symbol_names, "mul_symbol": r" \, ", "inv_trig_style": "full"})
 
     def latex(self, expression: Expr) -> str:
         """An expression in LaTeX."""
-        return str(self._printer.doprint(self._in_order(self._valued(expression)).xreplace(self._ordered)))
+        valued = self._valued(expression)
+        self.used.update(dict.fromkeys(sorted(str(symbol.name) for symbol in valued.free_symbols)))
+        return str(self._printer.doprint(self._in_order(valued).xreplace(self._ordered)))
 
     def _valued(self, expression: Expr) -> Expr:
         """The expression with numbers for those parameters that are printed by their value, or with reciprocals."""
@@ -230,6 +234,13 @@ class Writer:
             return self.latex(term)
         text = rf"\left({self.latex(coefficient)}\right)" if coefficient.is_Add else self.latex(coefficient)
         return rf"{text} \, {self.latex(behind[0])}"
+
+    def factor(self, gain: Expr) -> tuple[str, str]:
+        """Sign and size of what stands before a product that is printed already; nothing for a size of 1."""
+        sign = "-" if gain.could_extract_minus_sign() else "+"
+        size = -gain if sign == "-" else gain
+        text = rf"\left({self.latex(size)}\right)" if size.is_Add else self.latex(size)
+        return sign, "" if size == 1 else rf"{text} \, "
 
     def _signed(self, term: Expr) -> str:
         text = self._product(term)
