@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 
 import pytest
-from tests.equations.test_nomenclature import rows
 
-import shaftwork as sw
+from shaftwork.equations.records import Equations
 from shaftwork.scenes import SCENES
 from tests.beds import bed_of, registered
+from tests.latex.test_nomenclature import rows
 
 LETTER = re.compile(r"(?:\\Delta )?(?:\\[A-Za-z]+|[A-Za-z])'?(?:\^\{\([n0-9]+\)\})?_\{(?:[^{}]|\{[^{}]*\})*\}")
 
@@ -25,7 +25,7 @@ def letters(latex: str) -> set[str]:
     return {RUNNING.sub("#", text) for text in LETTER.findall(plain)}
 
 
-def equations_of(name: str) -> list[sw.Equations]:
+def equations_of(name: str) -> list[Equations]:
     if name not in SCENES:
         net = bed_of(name)
         return [net.equations(phase=net.start_phase() or None)]

@@ -333,10 +333,14 @@ def _to_rounding(expression: Expr) -> Expr:
 
 
 def _shared_sums(terms: tuple[Expr, ...], owner: str) -> tuple[tuple[tuple[Symbol, Expr], ...], tuple[Expr, ...]]:
-    """Long sums that occur several times in a law, under symbols of their own, and the law with these symbols."""
+    """Sums of a law under symbols of their own, and the law with these symbols: long ones that occur several times, and
+    those that alone, as factors, are longer than a line.
+    """
     counted = Counter(node for term in terms for node in preorder_traversal(term) if node.is_Add)
-    # a sum of fewer operations is not worth a letter
-    candidates = [node for node, times in counted.items() if times > 1 and node.count_ops() >= 3]
+    # a sum of fewer operations is not worth a letter; one of more can only be broken where it stands alone
+    candidates = [
+        node for node, times in counted.items() if node.count_ops() >= (3 if times > 1 else 40) and node not in terms
+    ]
     shared: list[tuple[Symbol, Expr]] = []
     for node in candidates[: len(AUXILIARY) - 1]:
         letter = Symbol(f"{owner}, sum {len(shared) + 1}", real=True)

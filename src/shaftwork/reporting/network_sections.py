@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from shaftwork.latex.blocks import Block
     from shaftwork.reporting.subject import Subject
 
+COLUMNS = 82
+"""Letters of a line of the model file, which a page has room for."""
 MOST_DRAWN = 60
 """Parts up to which a drawing can be read on a page."""
 
@@ -117,4 +120,7 @@ def model_file(subject: Subject) -> str:
     except ModelFileError as reason:
         subject.notes.append(f"There is no model file: {reason}")
         return ""
-    return f"\\begin{{verbatim}}\n{text.rstrip()}\n\\end{{verbatim}}"
+    lines = [part for line in text.rstrip().splitlines() for part in textwrap.wrap(line, COLUMNS) or [""]]
+    said = "" if len(lines) == len(text.rstrip().splitlines()) else "Lines that are too long for the page are wrapped."
+    body = "\n".join(lines)
+    return paragraphs(said, f"\\begin{{verbatim}}\n{body}\n\\end{{verbatim}}")

@@ -51,7 +51,7 @@ WORDS = ("introduction", "conclusions")
 """Sections that are the user's words alone: the first one, and the one before the nomenclature."""
 WRITTEN_LAST = "assumptions"
 """They name what could not be computed for the other sections."""
-HEAD = rf"""{PREAMBLE.replace("margin=25mm", "margin=23mm")}
+HEAD = rf"""{PREAMBLE.replace("margin=25mm", "margin=22mm")}
 \usepackage{{float}}
 \usepackage{{graphicx}}
 \providecommand{{\tightlist}}{{\setlength{{\itemsep}}{{0pt}}\setlength{{\parskip}}{{0pt}}}}"""
