@@ -7,6 +7,7 @@ import textwrap
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
@@ -89,9 +90,7 @@ class Report:
     @cached_property
     def latex(self) -> str:
         """The whole document, for pdflatex; it includes its figures by their names."""
-        from shaftwork import __version__
-
-        facts = {"Revision": self.revision, "Source": self.source, "Computed with": f"Shaftwork {__version__}"}
+        facts = {"Revision": self.revision, "Source": self.source, "Computed with": f"Shaftwork {version('shaftwork')}"}
         rows = [(in_text(name), in_text(text)) for name, text in facts.items() if text]
         body = "\n".join(f"\\section{{{in_text(heading)}}}\n{text}" for heading, text in self.sections)
         author = f"\\author{{{in_text(self.author)}}}\n" if self.author else ""
