@@ -81,7 +81,7 @@ def extremes(subject: Subject) -> str:
         rows.append((f"{breakable(name)} in {unit(least.unit)}", *values))
     said = "Extremes are those of the motion itself, searched between the output times, on both sides of every jump."
     heads = ("Quantity", "Minimum", "at s", "Maximum", "at s", "Mean", "End")
-    return paragraphs(in_text(said), columns(heads, rows, (5.2, 4.2, 2.8, 4.2, 2.8, 4.2, 4.2)))
+    return paragraphs(in_text(said), columns(heads, rows, (5.4, 4.2, 2.8, 4.2, 2.8, 4.2, 4.2)))
 
 
 def energy(subject: Subject) -> str:
