@@ -82,7 +82,7 @@ def extremes(subject: Subject) -> str:
         rows.append((rf"{breakable(part)}.\allowbreak {breakable(quantity)} in {unit(least.unit)}", *values))
     said = "Extremes are those of the motion itself, searched between the output times, on both sides of every jump."
     heads = ("Quantity", "Minimum", "at s", "Maximum", "at s", "Mean", "End")
-    return paragraphs(in_text(said), columns(heads, rows, (4.6, 4.25, 2.9, 4.25, 2.9, 4.25, 4.25)))
+    return paragraphs(in_text(said), columns(heads, rows, (4.4, 4.25, 3.1, 4.25, 3.1, 4.15, 4.15)))
 
 
 def energy(subject: Subject) -> str:
