@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
-    from shaftwork import reduce as reduce, scenes as scenes, sizing as sizing, studies as studies
+    from shaftwork import live as live, reduce as reduce, scenes as scenes, sizing as sizing, studies as studies
     from shaftwork.components.base import (
         Component as Component,
         Port as Port,
@@ -143,7 +143,7 @@ _HOME = {
     "shaftwork.results.fatigue": ("SNLine",),
     "shaftwork.results.solution": ("Solution",),
 }
-_PACKAGES = ("reduce", "scenes", "sizing", "studies")
+_PACKAGES = ("live", "reduce", "scenes", "sizing", "studies")
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 import reprlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -321,6 +321,11 @@ def network_of(network: Any) -> Network:
     if not isinstance(network, Network):
         raise ParameterError(f"{reprlib.repr(network)} is no network. Give the train, net = sw.Network('train').")
     return network
+
+
+def with_values(network: Network, values: Mapping[str, Any]) -> Network:
+    """The network with other values of parameters, "part.parameter"; the one given stays as it is."""
+    return network._of(network.netlist().with_values(values))  # noqa: SLF001 (its own)
 
 
 def _sound(netlist: Netlist, accepted: str = "") -> StateForm:
