@@ -8,8 +8,10 @@ from pathlib import Path
 
 from shaftwork.cli.command import Data, Say, command, end_option, folder_option, load
 from shaftwork.cli.folder import Folder
+from shaftwork.core.errors import ParameterError
 
 FORMATS = ("pdf", "html", "tex")
+LIVE = "live.html"
 
 
 def report_options(parser: ArgumentParser) -> None:
@@ -21,8 +23,14 @@ def report_options(parser: ArgumentParser) -> None:
     for name, text in (("title", "of the document"), ("author", "who answers for it"), ("revision", "of the document")):
         parser.add_argument(f"--{name}", metavar="WORDS", help=text)
     parser.add_argument("--date", metavar="WORDS", help="date in words (default: today)")
-    parser.add_argument("--sections", metavar="NAME,...", type=_names, help="sections wanted (default: all)")
-    parser.add_argument("--signals", metavar="NAME,...", type=_names, help="quantities to draw, such as shaft.tau")
+    parser.add_argument("--sections", metavar="NAME,...", type=names_in, help="sections wanted (default: all)")
+    parser.add_argument("--signals", metavar="NAME,...", type=names_in, help="quantities to draw, such as shaft.tau")
+    parser.add_argument(
+        "--live",
+        metavar="PART.PARAMETER,...",
+        type=names_in,
+        help="with --html, write live.html besides: a page with sliders for one or two values, computed before",
+    )
     parser.add_argument(
         "--text", metavar="SECTION=FILE.md", action="append", default=[], type=_words, help="your words in Markdown"
     )
@@ -31,9 +39,12 @@ def report_options(parser: ArgumentParser) -> None:
 @command("a report to be signed: drawings, equations, motion, extremes, as PDF and HTML", report_options)
 def report(options: Namespace, say: Say) -> Data:
     """The report of a scene or a model file."""
+    from shaftwork.live.session import Session
     from shaftwork.reporting.document import report as made_of
 
     net, scene = load(options)
+    if options.live and options.pdf and not options.html:
+        raise ParameterError("--live writes a page beside report.html. Give --html too, or leave out --pdf.")
     endings = [ending for ending in FORMATS if getattr(options, ending)] or ["pdf", "html"]
     chosen = {
         name: value
@@ -42,17 +53,20 @@ def report(options: Namespace, say: Say) -> Data:
     }
     subject = replace(scene, build=lambda: net) if scene else net
     document = made_of(subject, text=dict(options.text), **chosen)
+    page = Session(subject, t_end=options.t_end, signals=options.signals).page(options.live) if options.live else ""
     figures = [f"report-{name}.pdf" for name in document.figures] if "tex" in endings else []
-    folder = Folder(
-        options.out or Path("report"), [*(f"report.{ending}" for ending in endings), *figures], options.line
-    )
+    names = [*(f"report.{ending}" for ending in endings), *figures, *([LIVE] if page else [])]
+    folder = Folder(options.out or Path("report"), names, options.line)
     with folder.new_files(say) as place:
         for ending in endings:
             document.save(place / f"report.{ending}")
+        if page:
+            (place / LIVE).write_text(page, encoding="utf-8")
     return {}
 
 
-def _names(text: str) -> tuple[str, ...]:
+def names_in(text: str) -> tuple[str, ...]:
+    """Names with commas between them."""
     return tuple(name.strip() for name in text.split(",") if name.strip())
 
 

@@ -13,19 +13,11 @@ HOSTS = (HOST, "localhost")
 """Names of this machine that a browser may use; another name would be one that an attacker has made point here."""
 COOKIE = "shaftwork-{port}"
 """In which a browser keeps the token; cookies are of all ports of a machine."""
-POLICY = "; ".join(
-    (
-        "default-src 'none'",
-        "script-src 'self'",
-        "style-src 'self' 'unsafe-inline'",  # drawings and plots have styles in them
-        "img-src 'self' data: blob:",
-        "connect-src 'self'",
-        "base-uri 'none'",
-        "form-action 'none'",
-        "frame-ancestors 'none'",
-    )
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
+    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-"""What the page may load and run: what comes from this server, and nothing from elsewhere."""
+"""What the page may load and run: what comes from this server alone; drawings and plots have styles in them."""
 HEADERS = {
     "content-security-policy": POLICY,
     "x-content-type-options": "nosniff",
@@ -78,7 +70,7 @@ class Admission:
             cookies = SimpleCookie(headers.get("cookie", ""))
         except CookieError:
             return ""
-        return cookies[self._cookie].value if self._cookie in cookies else ""
+        return str(cookies[self._cookie].value) if self._cookie in cookies else ""
 
     def _with_headers(self, send: Send, *, first: bool) -> Send:
         async def sent(message: MutableMapping[str, Any]) -> None:
@@ -94,7 +86,8 @@ class Admission:
 
 def _asked(scope: Scope) -> str:
     """The token in an address."""
-    return parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0]
+    query: bytes = scope["query_string"]
+    return parse_qs(query.decode("latin-1")).get("token", [""])[0]
 
 
 def _encoded(headers: Iterable[tuple[str, str]]) -> list[tuple[bytes, bytes]]:

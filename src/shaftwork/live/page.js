@@ -1,6 +1,7 @@
 "use strict";
 
-/* The page: sliders ask, answers are shown. One question is on its way at a time, and the newest values win. */
+/* The page: sliders ask, answers are shown. One question is on its way at a time, and the newest values win. While an
+   answer is drawn, the next one is computed. */
 
 const REST = 150; // ms without a change, after which extremes, frequencies and the drawing follow
 const TICKS = 500; // of a slider, from its middle to each end
@@ -65,12 +66,19 @@ function askStored() {
 
 const ask = precomputed ? askStored() : askServer();
 
+/** A question about the newest values, and its answer once it is there. */
+async function asked(want) {
+  changed = false;
+  const question = request(want);
+  return { question, answer: await ask(question) };
+}
+
 function request(want) {
   const set = Object.fromEntries(setup.sliders.filter(one => values.get(one.name) !== one.value).map(one => [one.name, values.get(one.name)]));
   const end = byId("end").value.trim();
-  const asked = { set, want, t_end: end !== "" && Number.isFinite(Number(end)) ? Number(end) : end };
-  if (byId("at").checked) asked.at = time();
-  return asked;
+  const question = { set, want, t_end: end !== "" && Number.isFinite(Number(end)) ? Number(end) : end };
+  if (byId("at").checked) question.at = time();
+  return question;
 }
 
 /** Show the newest values: curves at once, and what takes longer when the values rest. */
@@ -81,9 +89,10 @@ async function follow() {
   if (busy) return;
   busy = true;
   try {
-    while (changed) {
-      changed = false;
-      accept(await ask(request(["curves"])), showCurves);
+    for (let coming = asked(["curves"]); coming; ) {
+      const newest = await coming;
+      coming = changed ? asked(["curves"]) : null;
+      accept(newest, showCurves);
     }
   } catch (error) {
     say(error.message);
@@ -97,7 +106,7 @@ async function detail() {
   busy = true;
   try {
     for (const want of [["extremes", "modes"], ["drawing"]]) {
-      if (!changed) accept(await ask(request(want)), showDetail);
+      if (!changed) accept(await asked(want), showDetail);
     }
   } catch (error) {
     say(error.message);
@@ -106,7 +115,7 @@ async function detail() {
   if (changed) follow();
 }
 
-function accept(answer, show) {
+function accept({ question, answer }, show) {
   if (answer.error) {
     say(answer.error);
     return;
@@ -114,7 +123,7 @@ function accept(answer, show) {
   say("");
   for (const control of controls.values()) control.field.removeAttribute("aria-invalid");
   show(answer);
-  byId("results").dataset.set = JSON.stringify(request([]).set);
+  byId("results").dataset.set = JSON.stringify(question.set);
 }
 
 function say(text) {
@@ -313,8 +322,20 @@ function showPhases() {
 
 function showExtremes() {
   const place = placeOf(shown.t, time());
-  const rows = setup.axes.flatMap(axis => axis.signals.map(name => ({ name, unit: axis.unit, ...extremes.find(row => row.name === name) })));
-  fill("extremes", rows.map(row => [row.name, row.unit, read(shown.curves[row.name], place), row.min ?? "", row.t_min ?? "", row.max ?? "", row.t_max ?? ""]));
+  const rows = setup.axes.flatMap(axis =>
+    axis.signals.map(name => {
+      const row = extremes.find(one => one.name === name);
+      const ends = row ? [row.min, row.t_min, row.max, row.t_max] : sampled(shown.curves[name]);
+      return [name, axis.unit, read(shown.curves[name], place), ...ends];
+    }),
+  );
+  fill("extremes", rows);
+}
+
+/** Extremes of what is drawn, to be told from those of the motion, which follow when the values rest. */
+function sampled(curve) {
+  const [least, most] = [Math.min(...curve), Math.max(...curve)];
+  return [least, most].flatMap(value => [`≈ ${printed(value, 4)}`, `≈ ${printed(shown.t[curve.indexOf(value)], 4)}`]);
 }
 
 function showModes(answer) {
@@ -434,7 +455,8 @@ function start() {
     follow();
   });
   byId("keep").addEventListener("click", () => {
-    reference = reference === shown ? null : shown;
+    reference = reference ? null : shown;
+    byId("keep").textContent = reference ? "Drop the reference" : "Keep as reference";
     drawPlot();
   });
   for (const button of document.querySelectorAll("[data-file]")) {

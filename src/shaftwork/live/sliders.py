@@ -44,7 +44,7 @@ class Slider:
         spread = [np.geomspace(*half) for half in halves if half[0] != half[1]]
         values = np.unique(np.concatenate([*spread, [self.value]]))
         exact = np.where(np.isclose(values, self.value, rtol=1e-12), self.value, values)
-        return np.unique(np.rint(exact) if self.whole else exact).tolist()
+        return [float(value) for value in np.unique(np.rint(exact) if self.whole else exact)]
 
     def described(self) -> dict[str, Any]:
         """As the page takes it."""

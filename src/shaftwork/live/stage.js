@@ -138,7 +138,7 @@ class Stage {
     const modes = this.mode ? {} : (this.phases.findLast(row => row.start <= time) || this.phases[0] || { modes: {} }).modes;
     for (const link of this.train.links) this.drawLink(pen, link, places, angles, modes, room);
     this.train.nodes.forEach((node, k) => this.drawNode(pen, node, places[k], radius * this.sizes[k], angles[k], room));
-    this.train.nodes.forEach((_, k) => this.drawEnds(pen, k, places[k], modes, room));
+    this.train.nodes.forEach((_, k) => this.drawEnds(pen, k, places[k], radius * this.sizes[k], modes, room));
   }
 
   drawLink(pen, link, places, angles, modes, room) {
@@ -210,10 +210,10 @@ class Stage {
     }
   }
 
-  drawEnds(pen, k, at, modes, room) {
+  drawEnds(pen, k, at, radius, modes, room) {
     pen.font = "11px system-ui, sans-serif";
     pen.textAlign = "center";
-    let y = at.y + 62;
+    let y = at.y + Math.max(radius, 12) + 28;
     for (const end of this.train.ends.filter(one => one.node === k)) {
       const mode = modes[end.part];
       if (mode === undefined) continue;

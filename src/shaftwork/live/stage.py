@@ -33,11 +33,9 @@ class Stage:
     @property
     def signals(self) -> tuple[str, ...]:
         """The quantities that are needed to move it."""
-        return tuple(
-            [
-                *(str(node["speed"]) for node in self.nodes),
-                *(str(link["twist"]) for link in self.links if link["twist"]),
-            ]
+        return (
+            *(str(node["speed"]) for node in self.nodes),
+            *(str(link["twist"]) for link in self.links if link["twist"]),
         )
 
     def described(self) -> dict[str, Any]:
