@@ -25,17 +25,28 @@ USES = {
     "drawing": "net.draw()",
     "studies": "sw.studies.work_precision",
     "reporting": "sw.report(net, sections=['parts'])",
+    "live": "sw.live.Session(net, t_end=0.1)",
 }
 """By feature, something small that takes it."""
 
-NEEDS = {"reporting": ("latex", "drawing", "modelfiles")}
+NEEDS = {
+    "reporting": ("latex", "drawing", "modelfiles"),
+    "live": ("reporting", "latex", "drawing", "modelfiles", "frequency"),
+}
 """By feature, those that it is made of."""
 
 JOINS = {
-    "drawing": ("shaftwork.reporting",),
-    "modelfiles": ("shaftwork.reporting",),
+    "drawing": ("shaftwork.reporting", "shaftwork.live"),
+    "modelfiles": ("shaftwork.reporting", "shaftwork.live"),
+    "reporting": ("shaftwork.live",),
+    "frequency": ("shaftwork.live",),
     "hybrid": ("shaftwork.waves.phased_waves", "shaftwork.waves.hybrid_waves", "shaftwork.sweep.phased_ensemble"),
-    "latex": ("shaftwork.lagrange.lagrange_print", "shaftwork.reduce.reduction_print", "shaftwork.reporting"),
+    "latex": (
+        "shaftwork.lagrange.lagrange_print",
+        "shaftwork.reduce.reduction_print",
+        "shaftwork.reporting",
+        "shaftwork.live",
+    ),
 }
 """By feature, modules of other rooms that join these to it; they are loaded where both are at work."""
 

@@ -10,20 +10,20 @@ from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING, Any
 
-from shaftwork.core.errors import ParameterError, SimulationError, imported
+from shaftwork.core.errors import ParameterError, imported
 from shaftwork.core.parameters import whole
+from shaftwork.live.page_requests import WANTED
 from shaftwork.live.sliders import Slider, chosen
 
 if TYPE_CHECKING:
     from shaftwork.live.session import Session
 
-HERE = Path(__file__).parent
-SCRIPTS = ("stage.js", "page.js")
+WEB = Path(__file__).parent / "web"
+SCRIPTS = ("stage.js", "plot.js", "page.js")
 COUNTS = {1: (21,), 2: (11, 11)}
 """Values along each slider of a page without a server, when nobody chooses."""
 MOST_ANSWERS = 400
 """Answers in one page: each takes some 100 kB."""
-ALL = ["curves", "extremes", "modes", "drawing"]
 
 
 def plotly_script() -> str:
@@ -50,7 +50,7 @@ def static_page(session: Session, sliders: Sequence[str], counts: Sequence[int] 
             f"sliders = {', '.join(sliders)}: a page without a server has one or two, such as shaft.c."
         )
     grid = _grid(axes, counts or COUNTS[len(axes)])
-    answers = [_answered(session, dict(zip(sliders, values, strict=True))) for values in product(*grid)]
+    answers = [session.answer({"set": dict(zip(sliders, at, strict=True)), "want": [*WANTED]}) for at in product(*grid)]
     precomputed = {
         "sliders": [{"name": name, "values": values} for name, values in zip(sliders, grid, strict=True)],
         "answers": answers,
@@ -75,14 +75,6 @@ def _grid(axes: Sequence[Slider], counts: Sequence[int]) -> list[list[float]]:
     return grid
 
 
-def _answered(session: Session, values: dict[str, float]) -> dict[str, Any]:
-    """The whole answer; values that cannot be answer with the words of the library, unless the page was given up."""
-    answer = session.answer({"set": values, "want": ALL})
-    if session.closing.is_set():
-        raise SimulationError(answer["error"])
-    return answer
-
-
 def _filled(session: Session, style: str, scripts: str, answers: Any) -> str:
     return Template(_text("page.html")).substitute(
         title=escape(session.title),
@@ -104,4 +96,4 @@ def _inside(script: str) -> str:
 
 
 def _text(name: str) -> str:
-    return (HERE / name).read_text(encoding="utf-8")
+    return (WEB / name).read_text(encoding="utf-8")

@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from shaftwork.core.errors import ParameterError, ShaftworkError, imported
+from shaftwork.core.parameters import whole
 from shaftwork.live.admission import HOST, HOSTS, Admission
-from shaftwork.live.page import HERE, SCRIPTS, plotly_script, served_page
+from shaftwork.live.page import SCRIPTS, WEB, plotly_script, served_page
 from shaftwork.live.session import Session
 from shaftwork.modelfiles.storage import write_netlist
 from shaftwork.pipeline.network import Network
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 FILES = {"model.toml": "application/toml", "report.pdf": "application/pdf", "report.html": "text/html; charset=utf-8"}
 """What can be saved from the page, with its kind."""
 KINDS = {".css": "text/css; charset=utf-8", ".js": "text/javascript; charset=utf-8"}
+MOST_PORTS = 65_535
 MOST_BYTES = 1_000_000
 """Of a request."""
 EXTRA, PURPOSE = "live", "A live page"
@@ -59,15 +61,17 @@ def serve(
         signals: quantities to draw, as of `Session`.
 
     Raises:
-        ParameterError: the port is taken.
+        ParameterError: the port is taken, or none.
         MissingExtraError: starlette, uvicorn, websockets or plotly is not installed (extra `live`).
     """
     uvicorn = [imported(name, EXTRA, PURPOSE) for name in ("websockets", "uvicorn")][-1]
     session = subject if isinstance(subject, Session) else Session(subject, t_end=t_end, signals=signals)
     token = secrets.token_urlsafe(32)
+    if whole(port, 0, MOST_PORTS) is None:
+        raise ParameterError(f"port = {port!r} must be a whole number up to {MOST_PORTS}; 0 takes a free one.")
     try:
         listening = socket.create_server((HOST, port))
-    except (OSError, OverflowError) as error:
+    except OSError as error:
         raise ParameterError(f"Port {port} cannot be opened: {error}. Leave it out for a free one.") from None
     with listening:
         number = listening.getsockname()[1]
@@ -99,7 +103,7 @@ def application(session: Session, token: str, port: int) -> Starlette:
     from starlette.responses import Response
     from starlette.routing import Route, WebSocketRoute
 
-    page, sources = served_page(session), {name: (HERE / name).read_text("utf-8") for name in ("page.css", *SCRIPTS)}
+    page, sources = served_page(session), {name: (WEB / name).read_text("utf-8") for name in ("page.css", *SCRIPTS)}
     sources["plotly.js"] = plotly_script()
     one = asyncio.Lock()  # a session answers one after another
 

@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError
+from shaftwork.core.errors import ShaftworkError, SimulationError
 from shaftwork.core.notices import FILTERS
 from shaftwork.frequency.exact_networks import exact_shafts
 from shaftwork.frequency.natural_modes import Modes
+from shaftwork.live.page_requests import checked
 from shaftwork.live.sliders import Slider, sliders_of
 from shaftwork.live.stage import Stage, stage_of
 from shaftwork.pipeline.arguments import checked_parameters
@@ -35,8 +36,6 @@ MOST_MODES = 30
 """Modes in the table, the lowest."""
 END = 10.0
 """End of the motion of a network without a scene, s."""
-FIELDS = {"set": (dict,), "want": (list,), "t_end": (float, int, str), "at": (float, int, type(None))}
-"""What a request may have, and as what; a time that is a text is refused by the library, in its words."""
 
 
 class Session:
@@ -124,7 +123,7 @@ class Session:
         with FILTERS, warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             try:
-                answer = self._answer(_checked(request))
+                answer = self._answer(checked(request))
             except ShaftworkError as error:
                 return {"error": str(error)}
         return answer | {"warnings": list(dict.fromkeys(str(one.message) for one in caught))}
@@ -240,22 +239,6 @@ class Session:
     def save(self, path: str | Path, sliders: Sequence[str], counts: Sequence[int] = ()) -> None:
         """Write the page of `page` to a file."""
         Path(path).write_text(self.page(sliders, counts), encoding="utf-8")
-
-
-def _checked(request: Mapping[str, Any]) -> Mapping[str, Any]:
-    """A request with its defaults.
-
-    Raises:
-        ParameterError: it is none.
-    """
-    if not isinstance(request, Mapping):
-        raise ParameterError("A request must be an object, such as {'set': {'J1.J': 2.0}, 'want': ['curves']}.")
-    for name, value in request.items():
-        if name not in FIELDS:
-            raise ParameterError(f"A request has no {name!r}. It has: {', '.join(FIELDS)}.")
-        if not isinstance(value, FIELDS[name]):
-            raise ParameterError(f"{name} = {value!r} of a request is of the wrong kind.")
-    return {"set": {}, "want": ["curves"], **request}
 
 
 def _worst(values: Array) -> Array:

@@ -68,9 +68,11 @@ def stage_of(graph: CircuitGraph, names: Collection[str]) -> Stage:
         for other in places[1:]:
             twist = next((f"{part.name}.{name}" for name in TWISTS if f"{part.name}.{name}" in names), "")
             links.append({**label, "a": places[0], "b": other, "twist": twist, "ratio": _ratio(part)})
-    inertias = {
-        k: [f"{end['part']}.{key}" for end in ends if end["node"] == k for key in ("J", "m")] for k in range(len(nodes))
-    }
+    inertias: dict[int, list[str]] = {k: [] for k in range(len(nodes))}
+    for part in graph.parts:
+        for node in outer[part.name][:1]:
+            stored = (key for key in ("J", "m") if key in part.component.declared and node in number)
+            inertias[number.get(node, 0)] += [f"{part.name}.{key}" for key in stored]
     columns, rows = _places(len(nodes), links)
     described = (
         {

@@ -148,17 +148,12 @@ class Stage {
     const open = mode !== undefined && !HOLDS.test(mode);
     pen.lineWidth = 1;
     pen.strokeStyle = open ? "#b35c00" : "#59616d";
-    pen.setLineDash(open ? [6, 5] : []);
-    for (const side of [-half, half]) {
-      pen.beginPath();
-      pen.moveTo(a.x, a.y + side);
-      pen.lineTo(b.x, b.y + side);
-      pen.stroke();
-    }
-    pen.setLineDash([]);
-    pen.strokeStyle = "#1c4f8f";
-    pen.lineWidth = 1.5;
-    for (let line = 0; line < 4; line++) this.drawFibre(pen, a, b, half, angles[link.a], angles[link.b], (line * Math.PI) / 2);
+    const [near, far] = open ? [0.44, 0.56] : [0.5, 0.5]; // an open part leaves its middle free
+    const at = share => ({ x: a.x + share * (b.x - a.x), y: a.y + share * (b.y - a.y) });
+    const [one, other] = [angles[link.a], angles[link.b]];
+    const middle = (one + other) / 2;
+    this.drawShaft(pen, a, at(near), half, one, open ? one : middle);
+    this.drawShaft(pen, at(far), b, half, open ? other : middle, other);
     pen.fillStyle = open ? "#b35c00" : "#59616d";
     pen.font = "11px system-ui, sans-serif";
     pen.textAlign = "center";
@@ -166,9 +161,24 @@ class Stage {
     if (mode !== undefined || room > 80) pen.fillText(words, (a.x + b.x) / 2, (a.y + b.y) / 2 - half - 5);
   }
 
+  /** A piece of a shaft with lines along its surface, which show how it turns and twists. */
+  drawShaft(pen, a, b, half, from, to) {
+    for (const side of [-half, half]) {
+      pen.beginPath();
+      pen.moveTo(a.x, a.y + side);
+      pen.lineTo(b.x, b.y + side);
+      pen.stroke();
+    }
+    pen.save();
+    pen.strokeStyle = "#1c4f8f";
+    pen.lineWidth = 1.5;
+    for (let line = 0; line < 4; line++) this.drawFibre(pen, a, b, half, from, to, (line * Math.PI) / 2);
+    pen.restore();
+  }
+
   /** A line along the surface of a shaft, where it is in front. */
   drawFibre(pen, a, b, half, from, to, offset) {
-    const steps = 24;
+    const steps = 12;
     pen.beginPath();
     for (let k = 0; k <= steps; k++) {
       const angle = from + ((to - from) * k) / steps + offset;
