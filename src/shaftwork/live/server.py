@@ -102,6 +102,7 @@ def application(session: Session, token: str, port: int) -> Starlette:
     from starlette.middleware.trustedhost import TrustedHostMiddleware
     from starlette.responses import Response
     from starlette.routing import Route, WebSocketRoute
+    from starlette.websockets import WebSocketDisconnect
 
     page, sources = served_page(session), {name: (WEB / name).read_text("utf-8") for name in ("page.css", *SCRIPTS)}
     sources["plotly.js"] = plotly_script()
@@ -128,10 +129,11 @@ def application(session: Session, token: str, port: int) -> Starlette:
 
     async def answers(line: WebSocket) -> None:
         await line.accept()
-        async for text in line.iter_text():
-            async with one:
-                answer = await asyncio.to_thread(_answered, session, text)
-            await line.send_text(answer)
+        with contextlib.suppress(WebSocketDisconnect):  # the page may be closed before it is answered
+            async for text in line.iter_text():
+                async with one:
+                    answer = await asyncio.to_thread(_answered, session, text)
+                await line.send_text(answer)
 
     @contextlib.asynccontextmanager
     async def until_closed(_app: Any) -> AsyncIterator[None]:

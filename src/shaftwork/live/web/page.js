@@ -28,7 +28,10 @@ function printed(number, digits = 6) {
 }
 
 function numbers(packed) {
-  return new Float64Array(Uint8Array.from(atob(packed.bdata), sign => sign.charCodeAt(0)).buffer);
+  const text = atob(packed.bdata);
+  const bytes = new Uint8Array(text.length);
+  for (let k = 0; k < text.length; k++) bytes[k] = text.charCodeAt(k);
+  return new Float64Array(bytes.buffer);
 }
 
 /* Answers ------------------------------------------------------------------------------------------------------- */
@@ -366,6 +369,7 @@ function start() {
   byId("source").textContent = setup.source;
   byId("end").value = printed(setup.t_end);
   makeSliders();
+  makeLegend();
   byId("end").addEventListener("change", follow);
   byId("tools").addEventListener("submit", event => event.preventDefault());
   byId("reset").addEventListener("click", () => {

@@ -3,6 +3,8 @@
 /* Curves over time, one axis for each unit, and tables. */
 
 const MOST_MARKED = 60; // changes of mode up to which each is a line across the curves
+const AXIS = { type: "linear", ticklabeloverflow: "allow" }; // else data are searched for dates, and labels measured
+const hidden = new Set(); // names of curves that are not drawn
 const COLOURS = ["#1c4f8f", "#c4540a", "#2a7d3f", "#a3262a", "#6d4aa8", "#7a5230", "#b8478f", "#555b63"];
 
 function traces(answer, named) {
@@ -14,9 +16,25 @@ function traces(answer, named) {
       yaxis: place ? `y${place + 1}` : "y",
       mode: "lines",
       line: named ? { width: 1.4, color: colourOf(name) } : { width: 1, color: "#9aa3b0", dash: "dot" },
-      showlegend: named,
+      visible: !hidden.has(name),
     })),
   );
+}
+
+/** A switch for each curve: plotly's legend measures its texts anew at every update, and no key reaches it. */
+function makeLegend() {
+  for (const name of setup.axes.flatMap(axis => axis.signals)) {
+    const [label, box] = ["label", "input"].map(kind => document.createElement(kind));
+    Object.assign(box, { type: "checkbox", checked: true });
+    box.style.accentColor = colourOf(name);
+    box.addEventListener("change", () => {
+      if (box.checked) hidden.delete(name);
+      else hidden.add(name);
+      drawPlot();
+    });
+    label.append(box, name);
+    byId("legend").append(label);
+  }
 }
 
 function colourOf(name) {
@@ -35,7 +53,7 @@ function marks() {
       yaxis: axisOf(row.name),
       mode: "markers",
       marker: { size: 7, color: colourOf(row.name), symbol: "circle-open" },
-      showlegend: false,
+      visible: !hidden.has(row.name),
     })),
   );
 }
@@ -45,19 +63,27 @@ function axisOf(name) {
   return place ? `y${place + 1}` : "y";
 }
 
+/** Lines at the changes of mode, as one shape: each of many would be measured for itself. */
+function phaseLines() {
+  const starts = shown.phases.slice(1).map(row => row.start);
+  if (!starts.length || starts.length > MOST_MARKED) return [];
+  const path = starts.map(start => `M${start},0L${start},1`).join("");
+  return [{ type: "path", yref: "paper", path, line: { width: 0.5, color: "#9aa3b0" } }];
+}
+
 function drawPlot() {
   const count = setup.axes.length;
   const layout = {
     height: 90 + 190 * count,
-    margin: { l: 64, r: 12, t: 24, b: 40 },
+    margin: { l: 64, r: 12, t: 8, b: 40 },
     uirevision: "same",
-    legend: { orientation: "h", y: 1.01, yanchor: "bottom" },
-    xaxis: { title: { text: "t in s" }, anchor: count > 1 ? `y${count}` : "y", range: [shown.t[0], shown.t.at(-1)] },
-    shapes: shown.phases.length > MOST_MARKED ? [] : shown.phases.slice(1).map(row => ({ type: "line", yref: "paper", x0: row.start, x1: row.start, y0: 0, y1: 1, line: { width: 0.5, color: "#9aa3b0" } })),
+    showlegend: false,
+    xaxis: { ...AXIS, title: { text: "t in s" }, anchor: count > 1 ? `y${count}` : "y", range: [shown.t[0], shown.t.at(-1)] },
+    shapes: phaseLines(),
   };
   setup.axes.forEach((axis, place) => {
     const domain = [1 - (place + 1) / count + (place < count - 1 ? 0.04 : 0), 1 - place / count];
-    layout[place ? `yaxis${place + 1}` : "yaxis"] = { title: { text: axis.unit }, domain };
+    layout[place ? `yaxis${place + 1}` : "yaxis"] = { ...AXIS, title: { text: axis.unit }, domain };
   });
   const kept = reference ? traces(reference, false) : [];
   Plotly.react("plot", [...kept, ...traces(shown, true), ...marks()], layout, { responsive: true, displaylogo: false });
