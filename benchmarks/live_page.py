@@ -10,22 +10,19 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import socket
 import statistics
-import threading
 import time
 from collections.abc import Callable, Iterator
 
-import uvicorn
 from playwright.sync_api import sync_playwright
 
-from shaftwork.live.server import application
+from shaftwork.live.server import serving
 from shaftwork.live.session import POINTS, Session
 from shaftwork.scenes import SCENES
 
 MOVED = {"crane-start": "shaft.c", "crane": "shaft.c", "six-phases": "shaft.gap", "excavator": "shaft.c"}
 """Scenes, and the value that is changed in each."""
-ROUNDS, SECONDS, TOKEN = 60, 6.0, "of-this-benchmark"
+ROUNDS, SECONDS = 60, 6.0
 DRAG = """async ([name, seconds]) => {
   const slider = document.querySelector(`input[type="range"][data-name="${name}"]`);
   const drawn = [];
@@ -64,20 +61,13 @@ def costs(session: Session, name: str) -> tuple[float, float, float]:
 
 def drawn(session: Session, name: str) -> list[float]:
     """How long each update of a page took to draw, in ms, while a slider moved."""
-    with socket.create_server(("127.0.0.1", 0)) as listening, sync_playwright() as playwright:
-        port = listening.getsockname()[1]
-        config = uvicorn.Config(application(session, TOKEN, port), log_level="error", ws="websockets-sansio")
-        server = uvicorn.Server(config)
-        thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]})
-        thread.start()
+    with serving(session) as address, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
         page = browser.new_page(viewport={"width": 1300, "height": 900})
-        page.goto(f"http://127.0.0.1:{port}/?token={TOKEN}")
+        page.goto(address)
         page.wait_for_selector("#drawing svg")
         times: list[float] = page.evaluate(DRAG, [name, SECONDS])
         browser.close()
-        server.should_exit = True
-        thread.join()
     return times
 
 

@@ -5,24 +5,20 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import socket
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-import uvicorn
 from playwright.sync_api import Browser, Page, sync_playwright
 
 import shaftwork as sw
 from shaftwork.cli import main
-from shaftwork.live.server import application
+from shaftwork.live.server import serving
 from shaftwork.live.session import POINTS, Session
 from shaftwork.scenes import SCENES
 
 CHROMIUM = shutil.which("chromium")
-TOKEN = "secret"  # noqa: S105 (of these tests alone)
 
 pytestmark = [
     pytest.mark.slow,
@@ -62,15 +58,9 @@ def session() -> Session:
 
 @pytest.fixture(scope="module")
 def address(session: Session) -> Iterator[str]:
-    with socket.create_server(("127.0.0.1", 0)) as listening:
-        port = listening.getsockname()[1]
-        config = uvicorn.Config(application(session, TOKEN, port), log_level="error", ws="websockets-sansio")
-        server = uvicorn.Server(config)
-        thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]})
-        thread.start()
-        yield f"http://127.0.0.1:{port}/?token={TOKEN}"
-        server.should_exit = True
-        thread.join()
+    with serving(session) as address:
+        yield address
+    session.closing.clear()
 
 
 SETTLED = "() => document.querySelectorAll('.stale').length === 0 && byId('results').dataset.set"

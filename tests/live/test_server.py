@@ -4,27 +4,25 @@ from __future__ import annotations
 
 import http.client
 import json
+import logging
 import re
 import signal
 import socket
 import subprocess
 import sys
-import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
-import uvicorn
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 import shaftwork as sw
-from shaftwork.live.server import FILES, application, serve
+from shaftwork.live.server import FILES, serve, serving
 from shaftwork.live.session import Session
 from shaftwork.scenes import SCENES
 
-TOKEN = "the-token"  # noqa: S105 (of these tests alone)
 SECONDS = 60
 """After which a server that does not answer has failed."""
 
@@ -74,18 +72,20 @@ def session() -> Session:
 
 
 @pytest.fixture(scope="module")
-def port(session: Session) -> Iterator[int]:
-    """Of the server of the session."""
-    with socket.create_server(("127.0.0.1", 0)) as listening:
-        number = listening.getsockname()[1]
-        app = application(session, TOKEN, number)
-        server = uvicorn.Server(uvicorn.Config(app, log_level="error", ws="websockets-sansio"))
-        thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]})
-        thread.start()
-        yield number
-        server.should_exit = True
-        thread.join()
+def address(session: Session) -> Iterator[str]:
+    with serving(session) as address:
+        yield address
     session.closing.clear()
+
+
+@pytest.fixture(scope="module")
+def port(address: str) -> int:
+    return int(address.split(":")[2].partition("/")[0])
+
+
+@pytest.fixture(scope="module")
+def token(address: str) -> str:
+    return address.partition("token=")[2]
 
 
 @pytest.fixture
@@ -95,16 +95,16 @@ def stranger(port: int) -> Client:
 
 
 @pytest.fixture
-def browser(port: int) -> Client:
+def browser(port: int, token: str) -> Client:
     """One that has opened the address with the token."""
-    opened = Client(port).get(f"/?token={TOKEN}")
+    opened = Client(port).get(f"/?token={token}")
     return Client(port, {"Cookie": opened.headers["set-cookie"].partition(";")[0]})
 
 
 def refused(client: Client, origin: str | None) -> bool:
     """Whether a socket is refused as forbidden."""
-    with pytest.raises(InvalidStatus) as error:
-        client.socket(origin)
+    with pytest.raises(InvalidStatus) as error, client.socket(origin):
+        pass
     return error.value.response.status_code == 403
 
 
@@ -123,16 +123,16 @@ def test_a_socket_without_the_token_is_refused(stranger: Client) -> None:
     assert refused(stranger, stranger.home)
 
 
-def test_the_first_page_gives_a_cookie_that_no_script_and_no_other_site_can_use(stranger: Client) -> None:
-    answer = stranger.get(f"/?token={TOKEN}")
-    cookie = f"shaftwork-{stranger.port}={TOKEN}"
+def test_the_first_page_gives_a_cookie_that_no_script_and_no_other_site_can_use(stranger: Client, token: str) -> None:
+    answer = stranger.get(f"/?token={token}")
+    cookie = f"shaftwork-{stranger.port}={token}"
     assert answer.headers["set-cookie"] == f"{cookie}; HttpOnly; SameSite=Strict; Path=/"
     assert "default-src 'none'; script-src 'self'" in answer.headers["content-security-policy"]
-    assert TOKEN.encode() not in answer.content
+    assert token.encode() not in answer.content
     assert [stranger.get(path, Cookie=cookie).status for path in PATHS[:4]] == [200] * 4
     assert "set-cookie" not in stranger.get("/", Cookie=cookie).headers
     assert stranger.get("/", Cookie=f"{cookie}x").status == 403
-    assert stranger.get("/", Cookie=f"shaftwork-1={TOKEN}").status == 403
+    assert stranger.get("/", Cookie=f"shaftwork-1={token}").status == 403
 
 
 @pytest.mark.parametrize("host", ["example.org", "example.org:80", "127.0.0.1.example.org", "-"])
@@ -177,6 +177,7 @@ def test_the_model_file_has_the_values_of_the_page(browser: Client, tmp_path: Pa
     assert (answer.status, parts["J2"]["J"], parts["shaft"]["d"]) == (200, 80.0, 3.5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "start"), [("report.html", b"<!DOCTYPE html>"), ("report.pdf", b"%PDF")])
 def test_the_report_is_of_the_values_of_the_page(browser: Client, name: str, start: bytes) -> None:
     answer = browser.post(name, {"set": {"J2.J": 81.25}, "t_end": 0.5})
@@ -204,6 +205,20 @@ def test_serve_listens_to_this_machine_alone_and_refuses_a_port_that_is_taken(se
         serve(session, port=70000, browser=False)
 
 
+def test_a_page_that_is_closed_before_it_is_answered_leaves_no_error(
+    browser: Client, caplog: pytest.LogCaptureFixture
+) -> None:
+    logging.getLogger("uvicorn").propagate = True
+    for _ in range(5):
+        with browser.socket(browser.home) as line:
+            line.send(json.dumps({"set": {"J2.J": 77.0}, "want": ["extremes"]}))
+    with browser.socket(browser.home) as line:
+        line.send("{}")
+        assert "curves" in json.loads(line.recv(SECONDS))
+    assert caplog.records == []
+
+
+@pytest.mark.slow
 def test_the_command_serves_its_page_at_the_address_it_prints_until_ctrl_c() -> None:
     command = [sys.executable, "-m", "shaftwork", "open", "crane-start", "--no-browser", "--set", "J2.J=70"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:

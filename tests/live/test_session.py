@@ -57,6 +57,7 @@ def test_extremes_and_frequencies_are_those_of_the_library(crane: Session) -> No
     assert ([modes.shapes["rotor.omega"], modes.shapes["wheel.omega"]] == shapes.T).all()
 
 
+@pytest.mark.slow
 def test_modes_about_rest_need_no_motion_and_say_where_they_are_none() -> None:
     """Of a train through a wave no matrix is made; its modes are found with the exact shaft."""
     session = Session(SCENES["ship-line"])
@@ -154,6 +155,7 @@ def test_the_stage_has_turning_and_sliding_nodes_in_the_order_of_the_train() -> 
     assert {end["part"] for end in stage.ends} >= {"motor", "brake", "load"}
 
 
+@pytest.mark.slow
 @share_of_examples(0.5)
 @given(factors=st.lists(st.floats(0.26, 3.9), min_size=4, max_size=4))
 def test_any_position_of_the_sliders_is_answered_as_json(factors: list[float]) -> None:

@@ -6,7 +6,7 @@ A `Session` answers requests, as plain data; a server on this machine (`server`)
 
 from __future__ import annotations
 
-from shaftwork.live.server import serve
+from shaftwork.live.server import serve, serving
 from shaftwork.live.session import Session
 
-__all__ = ["Session", "serve"]
+__all__ = ["Session", "serve", "serving"]

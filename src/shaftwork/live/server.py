@@ -8,10 +8,11 @@ import json
 import secrets
 import socket
 import tempfile
+import threading
 import webbrowser
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from shaftwork.core.errors import ParameterError, ShaftworkError, imported
 from shaftwork.core.parameters import whole
@@ -36,6 +37,8 @@ KINDS = {".css": "text/css; charset=utf-8", ".js": "text/javascript; charset=utf
 MOST_PORTS = 65_535
 MOST_BYTES = 1_000_000
 """Of a request."""
+ROUND = 0.5
+"""Between two looks at whether a session was closed, s."""
 EXTRA, PURPOSE = "live", "A live page"
 
 
@@ -50,8 +53,6 @@ def serve(
 ) -> None:
     """Open a live page of a network in the browser, and serve it until Ctrl-C.
 
-    The server listens to the loopback address alone. It answers those who know the token in the address that it says.
-
     Args:
         subject: a network, a scene, or a session.
         port: by default a free one.
@@ -64,9 +65,30 @@ def serve(
         ParameterError: the port is taken, or none.
         MissingExtraError: starlette, uvicorn, websockets or plotly is not installed (extra `live`).
     """
-    uvicorn = [imported(name, EXTRA, PURPOSE) for name in ("websockets", "uvicorn")][-1]
     session = subject if isinstance(subject, Session) else Session(subject, t_end=t_end, signals=signals)
-    token = secrets.token_urlsafe(32)
+    with contextlib.suppress(KeyboardInterrupt), serving(session, port=port) as address:
+        say(f"{session.title}: {address}\nCtrl-C ends it.")
+        if browser:
+            webbrowser.open(address)
+        while not session.closing.wait(ROUND):  # in rounds, which Ctrl-C ends on every system
+            pass
+
+
+@contextlib.contextmanager
+def serving(session: Session, *, port: int = 0) -> Iterator[str]:
+    """Serve the live page of a session meanwhile, in a thread of its own; gives the address, with its token.
+
+    The server listens to the loopback address alone, and answers those who know the token.
+
+    Args:
+        session: what answers; it is closed in the end.
+        port: by default a free one.
+
+    Raises:
+        ParameterError: the port is taken, or none.
+        MissingExtraError: starlette, uvicorn, websockets or plotly is not installed (extra `live`).
+    """
+    uvicorn = [imported(name, EXTRA, PURPOSE) for name in ("websockets", "uvicorn")][-1]
     if whole(port, 0, MOST_PORTS) is None:
         raise ParameterError(f"port = {port!r} must be a whole number up to {MOST_PORTS}; 0 takes a free one.")
     try:
@@ -74,16 +96,18 @@ def serve(
     except OSError as error:
         raise ParameterError(f"Port {port} cannot be opened: {error}. Leave it out for a free one.") from None
     with listening:
-        number = listening.getsockname()[1]
+        token, number = secrets.token_urlsafe(32), listening.getsockname()[1]
+        options = {"log_level": "error", "timeout_graceful_shutdown": 1, "ws_max_size": MOST_BYTES}
         app = application(session, token, number)
-        address = f"http://{HOST}:{number}/?token={token}"
-        say(f"{session.title}: {address}\nCtrl-C ends it.")
-        options = {"log_level": "warning", "timeout_graceful_shutdown": 1, "ws_max_size": MOST_BYTES}
-        server = uvicorn.Server(uvicorn.Config(app, ws="websockets-sansio", **options))
-        if browser:
-            webbrowser.open(address)
-        with contextlib.suppress(KeyboardInterrupt):
-            server.run(sockets=[listening])
+        server = uvicorn.Server(uvicorn.Config(app, ws="websockets-sansio", lifespan="off", **options))
+        thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]}, name="live page")
+        thread.start()
+        try:
+            yield f"http://{HOST}:{number}/?token={token}"
+        finally:
+            session.closing.set()
+            server.should_exit = True
+            thread.join()
 
 
 def application(session: Session, token: str, port: int) -> Starlette:
@@ -135,11 +159,6 @@ def application(session: Session, token: str, port: int) -> Starlette:
                     answer = await asyncio.to_thread(_answered, session, text)
                 await line.send_text(answer)
 
-    @contextlib.asynccontextmanager
-    async def until_closed(_app: Any) -> AsyncIterator[None]:
-        yield
-        session.closing.set()
-
     return starlette.Starlette(  # type: ignore[no-any-return]
         routes=[
             Route("/", first),
@@ -151,7 +170,6 @@ def application(session: Session, token: str, port: int) -> Starlette:
             Middleware(TrustedHostMiddleware, allowed_hosts=list(HOSTS), www_redirect=False),
             Middleware(Admission, token=token, port=port),
         ],
-        lifespan=until_closed,
     )
 
 
