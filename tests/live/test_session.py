@@ -13,7 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import shaftwork as sw
+from shaftwork.cli import main
 from shaftwork.core.errors import ShaftworkError
+from shaftwork.live.page import served_page
 from shaftwork.live.session import POINTS, Session
 from shaftwork.live.sliders import SPAN
 from shaftwork.results.observer import Array
@@ -187,3 +189,36 @@ def test_errors_of_the_library_alone_are_answers(crane: Session, monkeypatch: py
     with pytest.raises(ZeroDivisionError):
         crane.answer({})
     assert not issubclass(ZeroDivisionError, ShaftworkError)
+
+
+@pytest.mark.parametrize(
+    ("sliders", "counts", "said"),
+    [
+        (["shaft.k"], (), "There is no slider 'shaft.k'. There are: motor.tau_a, "),
+        (["shaft.c", "shaft.c"], (), "sliders = shaft.c, shaft.c has a name twice."),
+        (["shaft.c", "J1.J", "J2.J"], (), "a page without a server has one or two, such as shaft.c."),
+        ([], (), "a page without a server has one or two, such as shaft.c."),
+        (["shaft.c"], (1,), r"counts = \(1,\) must be a whole number from 2 on for each slider"),
+        (["shaft.c"], (11, 11), r"counts = \(11, 11\) must be a whole number from 2 on for each slider"),
+        (["shaft.c", "J1.J"], (21, 21), r"counts = \(21, 21\) are 441 answers; a page has at most 400."),
+    ],
+)
+def test_a_page_without_a_server_refuses_what_it_cannot_offer(
+    crane: Session, sliders: list[str], counts: tuple[int, ...], said: str
+) -> None:
+    with pytest.raises(sw.ParameterError, match=said):
+        crane.page(sliders, counts)
+
+
+def test_the_command_refuses_a_live_page_beside_no_page(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["report", "crane-start", "--pdf", "--live", "shaft.c"]) == 2
+    assert capsys.readouterr().err == "shaftwork: --live writes live.html beside report.html. Give --html, too.\n"
+
+
+def test_no_text_of_a_network_ends_the_script_that_it_stands_in() -> None:
+    net = sw.Network("</script><script>alert(1)</script>")
+    net.add(sw.TorqueSource("motor", tau=10.0), "rotor")
+    net.add(sw.Inertia("J1", J=2.0), "rotor")
+    page = served_page(Session(net, t_end=1.0))
+    assert "<script>alert" not in page
+    assert "&lt;/script&gt;" in page

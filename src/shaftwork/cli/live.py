@@ -17,7 +17,7 @@ def open_options(parser: ArgumentParser) -> None:
     parser.add_argument("--no-browser", action="store_true", help="print the address alone")
 
 
-@command("a live page in the browser: sliders, and motion, extremes and frequencies that follow", open_options)
+@command("sliders in the browser; motion, extremes, frequencies follow", open_options)
 def open_page(options: Namespace, say: Say) -> Data:
     """A live page of a scene or a model file, until Ctrl-C."""
     from shaftwork.live.server import serve

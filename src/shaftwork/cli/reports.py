@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from shaftwork.cli.command import Data, Say, command, end_option, folder_option, load
 from shaftwork.cli.folder import Folder
 from shaftwork.core.errors import ParameterError
+
+if TYPE_CHECKING:
+    from shaftwork.pipeline.network import Network
+    from shaftwork.scenes.catalog import Scene
 
 FORMATS = ("pdf", "html", "tex")
 LIVE = "live.html"
@@ -39,12 +45,9 @@ def report_options(parser: ArgumentParser) -> None:
 @command("a report to be signed: drawings, equations, motion, extremes, as PDF and HTML", report_options)
 def report(options: Namespace, say: Say) -> Data:
     """The report of a scene or a model file."""
-    from shaftwork.live.session import Session
     from shaftwork.reporting.document import report as made_of
 
     net, scene = load(options)
-    if options.live and options.pdf and not options.html:
-        raise ParameterError("--live writes a page beside report.html. Give --html too, or leave out --pdf.")
     endings = [ending for ending in FORMATS if getattr(options, ending)] or ["pdf", "html"]
     chosen = {
         name: value
@@ -52,8 +55,8 @@ def report(options: Namespace, say: Say) -> Data:
         if (value := getattr(options, name)) is not None
     }
     subject = replace(scene, build=lambda: net) if scene else net
+    page = _live_page(options, subject, endings)
     document = made_of(subject, text=dict(options.text), **chosen)
-    page = Session(subject, t_end=options.t_end, signals=options.signals).page(options.live) if options.live else ""
     figures = [f"report-{name}.pdf" for name in document.figures] if "tex" in endings else []
     names = [*(f"report.{ending}" for ending in endings), *figures, *([LIVE] if page else [])]
     folder = Folder(options.out or Path("report"), names, options.line)
@@ -63,6 +66,21 @@ def report(options: Namespace, say: Say) -> Data:
         if page:
             (place / LIVE).write_text(page, encoding="utf-8")
     return {}
+
+
+def _live_page(options: Namespace, subject: Network | Scene, endings: Sequence[str]) -> str:
+    """The page of `--live`; empty without it.
+
+    Raises:
+        ParameterError: it would stand beside no page, or there is no such parameter.
+    """
+    if options.live is None:
+        return ""
+    if "html" not in endings:
+        raise ParameterError(f"--live writes {LIVE} beside report.html. Give --html, too.")
+    from shaftwork.live.session import Session
+
+    return Session(subject, t_end=options.t_end, signals=options.signals).page(options.live)
 
 
 def names_in(text: str) -> tuple[str, ...]:
