@@ -54,10 +54,10 @@ class Admission:
             await self._app(scope, receive, send)
             return
         headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
-        socket, first = scope["type"] == "websocket", self._is_token(_asked(scope))
+        socket, first = scope["type"] == "websocket", self._is_token(_in_address(scope))
         origin = headers.get("origin")
         foreign = origin not in self._origins and (socket or origin is not None)
-        if foreign or not (first or self._is_token(self._kept(headers))):
+        if foreign or not (first or self._is_token(self._in_cookie(headers))):
             await _refuse(send, socket=socket)
             return
         await self._app(scope, receive, self._with_headers(send, first=first))
@@ -65,7 +65,7 @@ class Admission:
     def _is_token(self, text: str) -> bool:
         return hmac.compare_digest(text.encode(), self._token.encode())
 
-    def _kept(self, headers: MutableMapping[str, str]) -> str:
+    def _in_cookie(self, headers: MutableMapping[str, str]) -> str:
         try:
             cookies = SimpleCookie(headers.get("cookie", ""))
         except CookieError:
@@ -84,7 +84,7 @@ class Admission:
         return sent
 
 
-def _asked(scope: Scope) -> str:
+def _in_address(scope: Scope) -> str:
     """The token in an address."""
     query: bytes = scope["query_string"]
     return parse_qs(query.decode("latin-1")).get("token", [""])[0]

@@ -68,7 +68,7 @@ function askStored() {
 const ask = precomputed ? askStored() : askServer();
 
 /** A question about the newest values, and its answer once it is there. */
-async function asked(want) {
+async function exchange(want) {
   changed = false;
   const question = request(want);
   return { question, answer: await ask(question) };
@@ -90,9 +90,9 @@ async function follow() {
   if (busy) return;
   busy = true;
   try {
-    for (let coming = asked(["curves"]); coming; ) {
+    for (let coming = exchange(["curves"]); coming; ) {
       const newest = await coming;
-      coming = changed ? asked(["curves"]) : null;
+      coming = changed ? exchange(["curves"]) : null;
       accept(newest, showCurves);
     }
   } catch (error) {
@@ -107,7 +107,7 @@ async function detail() {
   busy = true;
   try {
     for (const want of [["extremes", "modes"], ["drawing"]]) {
-      if (!changed) accept(await asked(want), showDetail);
+      if (!changed) accept(await exchange(want), showDetail);
     }
   } catch (error) {
     say(error.message);

@@ -85,8 +85,8 @@ function drawPlot() {
     const domain = [1 - (place + 1) / count + (place < count - 1 ? 0.04 : 0), 1 - place / count];
     layout[place ? `yaxis${place + 1}` : "yaxis"] = { ...AXIS, title: { text: axis.unit }, domain };
   });
-  const kept = reference ? traces(reference, false) : [];
-  Plotly.react("plot", [...kept, ...traces(shown, true), ...marks()], layout, { responsive: true, displaylogo: false });
+  const before = reference ? traces(reference, false) : [];
+  Plotly.react("plot", [...before, ...traces(shown, true), ...marks()], layout, { responsive: true, displaylogo: false });
 }
 
 function fill(table, rows) {

@@ -68,8 +68,9 @@ class Stage {
     }
     this.ratios = new Map(links.filter(link => link.ratio).map(link => [link, value(link.ratio)]));
     const inertias = nodes.map(node => node.inertias.reduce((sum, name) => sum + (value(name) || 0), 0));
-    const most = Math.max(...inertias, 1e-300);
-    this.sizes = inertias.map(inertia => (inertia > 0 ? Math.max(0.35, (inertia / most) ** 0.2) : 0.25));
+    const most = turns => Math.max(...inertias.filter((_, k) => nodes[k].turns === turns));
+    const share = (inertia, k) => (inertia / most(nodes[k].turns)) ** 0.2;
+    this.sizes = inertias.map((inertia, k) => (inertia > 0 ? Math.max(0.35, share(inertia, k)) : 0.25));
     const fastest = largest(nodes.map(node => curves[node.speed])) * rate;
     this.slowed = fastest > TURN ? rounded(TURN / fastest) : 1;
     const twist = largest(this.twists.values());
@@ -204,7 +205,7 @@ class Stage {
       pen.moveTo(at.x, at.y);
       pen.lineTo(at.x + radius * Math.cos(angle), at.y - radius * Math.sin(angle));
     } else {
-      const turns = angle / (2 * Math.PI);
+      const turns = angle / (2 * Math.PI) + 0.5;
       const x = at.x - radius + 2 * radius * (turns - Math.floor(turns));
       pen.moveTo(x, at.y - radius / 2);
       pen.lineTo(x, at.y + radius / 2);
