@@ -122,8 +122,8 @@ class Joints:
         self.places = np.array([form.laws.index(branch) for branch in branches], dtype=np.intp)
         self._branches = tuple(branches)
         loops = sparse.csr_array(part.loops)[list(form.across_states)][:, list(branches)]
-        none = sparse.csr_array((len(branches), size - across))
-        G = sparse.csr_array(sparse.hstack([loops.T, none]))
+        G = sparse.csr_array(loops.T)
+        G.resize((len(branches), size))  # what is no speed has no share
         B = sparse.csc_array(part.B)[:, self.places]
         followers = _followers(G)
         self.independent = followers is not None and not B[across:].nnz
