@@ -1,12 +1,13 @@
-"""Makes the pictures of the first page; those of other pages are drawn by their examples (`generate.py`).
+"""Makes the pictures of the first page and of the live page; others are drawn by their examples (`generate.py`).
 
-python -m docs.pictures             needs the extra `plot`, pdflatex and pdftoppm
+python -m docs.pictures             needs the extra `live`, playwright, chromium, pdflatex and pdftoppm
 
 Each file says in its description what it was made of, `sources()`; the tests compare that with what the code says now.
 """
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import tempfile
 from pathlib import Path
@@ -14,14 +15,19 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.image import imread, imsave
+from PIL import Image
+from playwright.sync_api import sync_playwright
 
 from docs.generate import RESOLUTION, curves
 from shaftwork import scenes
+from shaftwork.live import Session, serving
 from shaftwork.scenes.crane import WHEEL_RADIUS
 
 PICTURES = Path(__file__).parent / "pictures"
-EQUATIONS, START = "crane-equations.png", "crane-start.png"
+EQUATIONS, START, LIVE = "crane-equations.png", "crane-start.png", "live.png"
 
+COLOURS = 128
+"""Of a photograph, which is then a third as large."""
 MARGIN = 20
 """White pixels around what is printed."""
 
@@ -92,12 +98,30 @@ def typeset(body: str, picture: Path, height: int = 150) -> None:
     imsave(picture, inside, cmap="gray", vmin=0, vmax=1, metadata={"Description": body})
 
 
+def photograph(picture: Path) -> None:
+    """The live page of the crane with another stiffness, beside the curves of before."""
+    with serving(Session(scenes.SCENES["crane"])) as address, sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": 1000, "height": 920})
+        page.goto(address)
+        page.wait_for_selector("#drawing svg")
+        page.click("#keep")
+        page.locator('input[type="range"][data-name="shaft.c"]').fill("-300")
+        page.locator("#time").fill("672")
+        page.wait_for_selector(".stale", state="attached")
+        page.wait_for_function("() => !document.querySelector('.stale')")
+        page.screenshot(path=picture)
+        browser.close()
+    Image.open(picture).quantize(COLOURS).save(picture, optimize=True)
+
+
 def main() -> None:
     """Write all pictures."""
     PICTURES.mkdir(exist_ok=True)
     texts = sources()
     crane_start().savefig(PICTURES / START, dpi=RESOLUTION, metadata={"Description": texts[START]})
     typeset(texts[EQUATIONS], PICTURES / EQUATIONS)
+    photograph(PICTURES / LIVE)
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
     from shaftwork import (
+        live as live,
         reduce as reduce,
         scenes as scenes,
         sizing as sizing,
@@ -153,7 +154,7 @@ _HOME = {
     "shaftwork.results.solution": ("Solution",),
     "shaftwork.torsional.calculation": ("torsional_calculation",),
 }
-_PACKAGES = ("reduce", "scenes", "sizing", "studies", "torsional")
+_PACKAGES = ("live", "reduce", "scenes", "sizing", "studies", "torsional")
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 
 

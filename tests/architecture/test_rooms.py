@@ -29,18 +29,28 @@ USES = {
     "spectra": "net.simulate(0.1).spectrum('shaft.tau')",
     "reporting": "sw.report(net, sections=['parts'])",
     "torsional": "sw.torsional.Section",
+    "live": "sw.live.Session(net, t_end=0.1)",
 }
 """By feature, something small that takes it."""
 
-NEEDS = {"reporting": ("latex", "drawing", "modelfiles")}
+NEEDS = {
+    "reporting": ("latex", "drawing", "modelfiles"),
+    "live": ("reporting", "latex", "drawing", "modelfiles", "frequency"),
+}
 """By feature, those that it is made of."""
 
 JOINS = {
-    "frequency": ("shaftwork.torsional.forced_train",),
-    "drawing": ("shaftwork.reporting",),
-    "modelfiles": ("shaftwork.reporting",),
+    "drawing": ("shaftwork.reporting", "shaftwork.live"),
+    "modelfiles": ("shaftwork.reporting", "shaftwork.live"),
+    "reporting": ("shaftwork.live",),
+    "frequency": ("shaftwork.live", "shaftwork.torsional.forced_train"),
     "hybrid": ("shaftwork.waves.hybrid_wave_model", "shaftwork.waves.hybrid_waves", "shaftwork.sweep.hybrid_ensemble"),
-    "latex": ("shaftwork.lagrange.lagrange_print", "shaftwork.reduce.reduction_print", "shaftwork.reporting"),
+    "latex": (
+        "shaftwork.lagrange.lagrange_print",
+        "shaftwork.reduce.reduction_print",
+        "shaftwork.reporting",
+        "shaftwork.live",
+    ),
 }
 """By feature, modules of other rooms that join these to it; they are loaded where both are at work."""
 

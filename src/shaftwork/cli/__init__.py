@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from shaftwork.cli import drawings, frequencies, inspection, reports, run, studies
+from shaftwork.cli import drawings, frequencies, inspection, live, reports, run, studies
 from shaftwork.cli.command import Command
 from shaftwork.core.errors import ShaftworkError, SimulationError
 from shaftwork.core.notices import VALUES, on_the_command_line
@@ -26,6 +26,7 @@ COMMANDS: tuple[Command, ...] = (
     drawings.draw,
     run.run,
     reports.report,
+    live.open_page,
     frequencies.modes,
     frequencies.campbell,
     studies.sweep,

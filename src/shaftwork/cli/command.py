@@ -46,8 +46,8 @@ class Command:
 
     @property
     def name(self) -> str:
-        """The name under which it is called."""
-        return self.run.__name__
+        """The name under which it is called; that of its function may say more."""
+        return self.run.__name__.partition("_")[0]
 
 
 def command(

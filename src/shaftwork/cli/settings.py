@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from copy import copy
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from shaftwork.core.errors import MissingExtraError, ModelFileError, ParameterError
@@ -32,12 +31,9 @@ def with_settings(net: Network, settings: Iterable[str]) -> Network:
         ParameterError: there is no such parameter, or the value is not admissible.
         MissingExtraError: a value has a unit, and pint is not installed.
     """
-    values = once("--set", (setting(net, text) for text in settings))
-    changed, owners = copy(net), {name.rpartition(".")[0] for name in values}
-    for placed in net.netlist().with_values(values).placed:
-        if placed.part.name in owners:
-            changed.replace(placed.part)
-    return changed
+    from shaftwork.pipeline.network import with_values
+
+    return with_values(net, once("--set", (setting(net, text) for text in settings)))
 
 
 def setting(net: Network, text: str) -> tuple[str, Any]:

@@ -167,6 +167,7 @@ class PhaseObserver:
 
     def __init__(self, run: HybridRun, stretches: Stretches) -> None:
         self._run, self._stretches, self._names = run, stretches, stretches.names
+        self._last: tuple[Array, Array, tuple[tuple[ModelObserver, Index, Array, Array], ...]] | None = None
 
     def impacts(self, _dense: DenseWaves) -> tuple[Impact, ...]:
         """Instants at which energy may be given or lost at once."""
@@ -245,7 +246,18 @@ class PhaseObserver:
         """A component of the network, with the parameter values of this motion."""
         return self._first.part(name)
 
-    def _pieces(self, t: Array, x: Array) -> Iterator[tuple[ModelObserver, Index, Array, Array]]:
+    def _pieces(self, t: Array, x: Array) -> tuple[tuple[ModelObserver, Index, Array, Array], ...]:
+        """By observer the places of times (k,), the times and the states there; the last ones asked for are kept.
+
+        An observer, too, keeps what it has computed for the very arrays that it was given last: of many quantities at
+        the same times only the first costs.
+        """
+        last = self._last
+        if last is None or last[0] is not t or last[1] is not x:
+            last = self._last = t, x, tuple(self._cut(t, x))
+        return last[2]
+
+    def _cut(self, t: Array, x: Array) -> Iterator[tuple[ModelObserver, Index, Array, Array]]:
         names = self._names
         for first, places in self._stretches.groups(t):
             columns = [*map(names.index, first.regime.model.states), *range(len(names), x.shape[1])]

@@ -372,3 +372,8 @@ def network_of(network: Any) -> Network:
     if not isinstance(network, Network):
         raise ParameterError(f"{reprlib.repr(network)} is no network. Give the train, net = sw.Network('train').")
     return network
+
+
+def with_values(network: Network, values: Mapping[str, Any]) -> Network:
+    """The network with other values of parameters, "part.parameter"; the one given stays as it is."""
+    return network._of(network.netlist().with_values(values))  # noqa: SLF001 (its own)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import reprlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -155,11 +156,15 @@ class Reader:
 
     def __init__(self, title: str, states: tuple[str, ...], observer: Observer, dense: DenseStates) -> None:
         self.title, self.states, self.observer, self.dense = title, states, observer, dense
-        self.steps = dense.steps
         self._states_at: tuple[Array, Array] | None = None
         self._profile: tuple[str, Array, Array] | None = None
         self.unbounded: dict[tuple[str, int | None], dict[float, float]] = {}
         """Values that are not finite, by the name of the quantity and its place, and by time in s."""
+
+    @cached_property
+    def steps(self) -> Array:
+        """(s,) ends of the integration steps. An engine of output times alone integrates anew to tell them."""
+        return self.dense.steps
 
     @property
     def names(self) -> dict[str, None]:

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -122,8 +123,8 @@ class Joints:
         self.places = np.array([form.laws.index(branch) for branch in branches], dtype=np.intp)
         self._branches = tuple(branches)
         loops = sparse.csr_array(part.loops)[list(form.across_states)][:, list(branches)]
-        none = sparse.csr_array((len(branches), size - across))
-        G = sparse.csr_array(sparse.hstack([loops.T, none]))
+        G = sparse.csr_array(loops.T)
+        G.resize((len(branches), size))  # what is no speed has no share
         B = sparse.csc_array(part.B)[:, self.places]
         followers = _followers(G)
         self.independent = followers is not None and not B[across:].nnz
@@ -132,12 +133,15 @@ class Joints:
             return
         reactions, alike = _reactions(G, B), _alike(followers, size)
         self._B, self._reactions, self._alike = Factor(B), Factor(reactions), Factor(alike)
-        self._joined = joined = sparse.csr_array(alike @ (sparse.eye_array(size, format="csr") + B @ reactions))
+        self._joined = sparse.csr_array(alike @ (sparse.eye_array(size, format="csr") + B @ reactions))
+        self._part = part
+
+    @cached_property
+    def moving(self) -> LinearPart:
+        """The equations with what holds moving as one, to which its own laws add nothing; explicit rows need none."""
+        part, joined, alike = self._part, self._joined, self._alike.sparse
         others = sparse.diags_array(np.where(np.isin(np.arange(part.B.shape[1]), self.places), 0.0, 1.0))
-        self.moving = replace(
-            part, A=joined @ part.A, B=joined @ part.B @ others, B1=joined @ part.B1, C=part.C @ alike
-        )
-        """The equations with what holds moving as one, to which its own laws add nothing."""
+        return replace(part, A=joined @ part.A, B=joined @ part.B @ others, B1=joined @ part.B1, C=part.C @ alike)
 
     def reactions(self, rates: Array) -> Array:
         """(h,) or (h, k): what cancels rates (n,) or (n, k) in the speeds across."""
@@ -227,7 +231,11 @@ class HeldArrays(BoundArrays):
 
     def __init__(self, program: ArrayProgram, p: Array, part: LinearPart, joints: Joints) -> None:
         super().__init__(program, p, part)
-        self.joints, self._moving = joints, BoundArrays(program, p, joints.moving, full=True)
+        self.joints = joints
+
+    @cached_property
+    def _moving(self) -> BoundArrays:
+        return BoundArrays(self.program, self.p, self.joints.moving, full=True)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return HeldArrays, (self.program, self.p, self.part, self.joints)
