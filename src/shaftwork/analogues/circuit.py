@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from shaftwork.analogues.analogy import Analogy
-from shaftwork.analogues.elements import Edge, Element, ElementNames, Sum, elements_of, is_linear
+from shaftwork.analogues.circuit_elements import Edge, Element, ElementNames, Sum, elements_of, is_linear
 from shaftwork.analogues.images import IN_LAWS, image_class, image_of, in_circuit
 from shaftwork.analogues.readings import EdgeReading, Readings
 from shaftwork.components.base import Component

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Iterator, Sequence
 
 from shaftwork.analogues.analogy import Analogy
-from shaftwork.analogues.elements import Edge, Element, ElementNames, Sum, elements_of, in_numbers, is_linear
+from shaftwork.analogues.circuit_elements import Edge, Element, ElementNames, Sum, elements_of, in_numbers, is_linear
 from shaftwork.analogues.faces import DualEnds, Kuratowski, dual_ends
 from shaftwork.analogues.readings import EdgeReading, Readings, sums_of_nodes, total
 from shaftwork.analogues.rigid_joints import RigidJoints

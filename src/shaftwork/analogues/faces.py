@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import networkx as nx
 
-from shaftwork.analogues.elements import Edge
+from shaftwork.analogues.circuit_elements import Edge
 
 Pair = tuple[int, int]
 """Two nodes, the lower number first."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import networkx as nx
 
-from shaftwork.analogues.elements import Edge, Sum, in_numbers
+from shaftwork.analogues.circuit_elements import Edge, Sum, in_numbers
 from shaftwork.components.base import Signal
 from shaftwork.components.branches import End
 from shaftwork.formulation.form import Names, StateForm, store_name

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import networkx as nx
 
-from shaftwork.analogues.elements import Edge, Element, Sum
+from shaftwork.analogues.circuit_elements import Edge, Element, Sum
 from shaftwork.analogues.readings import EdgeReading, total
 from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind

@@ -78,7 +78,7 @@ def torsional_calculation(
     resonances = train.resonances(given)
     n = _refined(given, [(one.speed, one.damping) for one in resonances])
     amplitudes = train.amplitudes(n, tuple(shafts.values()))
-    vibrations = {}
+    vibrations: dict[str, ShaftVibration] = {}
     for shaft, torque in shafts.items():
         torques, places = worst_along(amplitudes[torque], train.orders, train.places(torque))
         section = known.get(shaft)
@@ -88,8 +88,7 @@ def torsional_calculation(
             barred = _barred(vibration, train, torque, top)
             vibration = ShaftVibration(shaft, n, train.orders, torques, places, section, limits, barred)
         vibrations[shaft] = vibration
-    failing = tuple(one.source.name for one in train.excitations if one.changed)
-    return TorsionalCalculation(net.name, n, train.orders, vibrations, resonances, top, failing, train, shafts)
+    return TorsionalCalculation(net.name, n, train.orders, vibrations, resonances, top, train.failing, train, shafts)
 
 
 def _ascending(speeds: Any) -> Array:
