@@ -131,6 +131,11 @@ class ForcedTrain:
     exact: bool
     t: Time
 
+    @property
+    def failing(self) -> tuple[str, ...]:
+        """The cylinders that misfire."""
+        return tuple(one.source.name for one in self.excitations if one.changed)
+
     @cached_property
     def orders(self) -> tuple[float, ...]:
         """(k,) of the reference shaft, ascending."""
