@@ -26,6 +26,7 @@ VALUES = {
     "SpeedSource": {"omega": sympy.sin(3 * sw.t)},
     "VoltageSource": {"u": sympy.cos(3 * sw.t)},
     "TorqueSource": {"tau": 2 - sw.omega},
+    "HarmonicTorque": {"harmonics": sw.Harmonics((0.5, 2.0), (1.5, 0.7), (0.3, -1.0)), "mean": 2.0},
     "ForceSource": {"f": 2 - sw.v},
     "CurrentSource": {"i": 1 - sw.u},
 }

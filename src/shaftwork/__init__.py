@@ -9,7 +9,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
-    from shaftwork import live as live, reduce as reduce, scenes as scenes, sizing as sizing, studies as studies
+    from shaftwork import (
+        live as live,
+        reduce as reduce,
+        scenes as scenes,
+        sizing as sizing,
+        studies as studies,
+        torsional as torsional,
+    )
     from shaftwork.components.base import (
         Component as Component,
         Port as Port,
@@ -35,6 +42,7 @@ if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
     from shaftwork.components.bucket_wheel import *
     from shaftwork.components.contacts import *
     from shaftwork.components.sources import *
+    from shaftwork.components.excitations import *
     from shaftwork.components.drives import *
     from shaftwork.components.electrical import *
     from shaftwork.components.friction import *
@@ -84,9 +92,10 @@ if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
     from shaftwork.equations.notations import Inverse as Inverse, Notation as Notation
     from shaftwork.pipeline.model import Model as Model
     from shaftwork.pipeline.network import Network as Network
-    from shaftwork.reporting.document import Report as Report, report as report
+    from shaftwork.reporting.report import Report as Report, report as report
     from shaftwork.results.fatigue import SNLine as SNLine
     from shaftwork.results.solution import Solution as Solution
+    from shaftwork.torsional.calculation import torsional_calculation as torsional_calculation
 
 __version__ = "0.1.0"
 
@@ -119,6 +128,7 @@ _HOME = {
     ),
     "shaftwork.components.drives": ("motors",),
     "shaftwork.components.bucket_wheel": ("Soil",),
+    "shaftwork.components.excitations": ("Harmonics",),
     "shaftwork.components.noise": ("HeldNoise", "SmoothNoise"),
     "shaftwork.components.tables": ("Table",),
     "shaftwork.components.laws": ("PWM", "Ramp", "Step", "omega", "phi", "psi", "s", "t", "u", "v"),
@@ -139,11 +149,12 @@ _HOME = {
     "shaftwork.equations.notations": ("Inverse", "Notation"),
     "shaftwork.pipeline.model": ("Model",),
     "shaftwork.pipeline.network": ("Network",),
-    "shaftwork.reporting.document": ("Report", "report"),
+    "shaftwork.reporting.report": ("Report", "report"),
     "shaftwork.results.fatigue": ("SNLine",),
     "shaftwork.results.solution": ("Solution",),
+    "shaftwork.torsional.calculation": ("torsional_calculation",),
 }
-_PACKAGES = ("live", "reduce", "scenes", "sizing", "studies")
+_PACKAGES = ("live", "reduce", "scenes", "sizing", "studies", "torsional")
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 
 

@@ -23,9 +23,13 @@ USES = {
     "reduce": "sw.reduce.refer(net, 'wheel')",
     "sizing": "sw.sizing.duty",
     "drawing": "net.draw()",
+    "analogues": "net.circuit().simulate(0.1)",
     "studies": "sw.studies.work_precision",
+    "animation": "net.simulate(0.1).animate()",
+    "spectra": "net.simulate(0.1).spectrum('shaft.tau')",
     "reporting": "sw.report(net, sections=['parts'])",
     "live": "sw.live.Session(net, t_end=0.1)",
+    "torsional": "sw.torsional.Section",
 }
 """By feature, something small that takes it."""
 
@@ -36,11 +40,11 @@ NEEDS = {
 """By feature, those that it is made of."""
 
 JOINS = {
+    "frequency": ("shaftwork.torsional.forced_train", "shaftwork.live"),
     "drawing": ("shaftwork.reporting", "shaftwork.live"),
     "modelfiles": ("shaftwork.reporting", "shaftwork.live"),
     "reporting": ("shaftwork.live",),
-    "frequency": ("shaftwork.live",),
-    "hybrid": ("shaftwork.waves.phased_waves", "shaftwork.waves.hybrid_waves", "shaftwork.sweep.phased_ensemble"),
+    "hybrid": ("shaftwork.waves.hybrid_wave_model", "shaftwork.waves.hybrid_waves", "shaftwork.sweep.hybrid_ensemble"),
     "latex": (
         "shaftwork.lagrange.lagrange_print",
         "shaftwork.reduce.reduction_print",

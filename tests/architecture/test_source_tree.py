@@ -14,6 +14,8 @@ import grimp
 import networkx as nx
 import pytest
 
+import shaftwork as sw
+
 SOURCE = Path(__file__).parents[2] / "src" / "shaftwork"
 FILES = tuple(sorted(SOURCE.rglob("*.py")))
 Function = ast.FunctionDef | ast.AsyncFunctionDef
@@ -175,3 +177,16 @@ def test_importing_the_package_imports_nothing_heavy() -> None:
     code = f"import sys, shaftwork; print([name for name in {HEAVY!r} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_tests_and_benchmarks_name_nothing_that_the_package_lacks() -> None:
+    """Also in annotations, which nobody evaluates."""
+    root = SOURCE.parents[1]
+    lacking = [
+        f"{file.relative_to(root)}:{node.lineno} sw.{node.attr}"
+        for folder in ("tests", "benchmarks")
+        for file in sorted((root / folder).rglob("*.py"))
+        for node in ast.walk(tree(file))
+        if isinstance(node, ast.Attribute) and ast.unparse(node.value) == "sw" and not hasattr(sw, node.attr)
+    ]
+    assert lacking == []

@@ -15,6 +15,7 @@ import sympy
 from numpy.typing import NDArray
 
 import shaftwork as sw
+from shaftwork.components.shaft_models import ShaftModel
 from shaftwork.core.errors import CompileError, MissingExtraError, ParameterError
 from shaftwork.scenes import SCENES
 
@@ -24,7 +25,7 @@ CLOSE = 1e-12
 """Of the largest term in a sum: coefficients are rounded in another order."""
 
 
-def shaft(model: sw.ShaftModel) -> sw.Network:
+def shaft(model: ShaftModel) -> sw.Network:
     net = sw.Network("shaft")
     net.add(sw.TorqueSource("motor", tau=10 * sympy.sin(3 * sw.t)), "a")
     net.add(sw.Inertia("Je", J=0.025), "a")

@@ -26,6 +26,7 @@ OWN = [name for name, kind in REGISTRY.items() if kind.__module__.startswith("sh
 TOGETHER = {
     "CageMotor": {"tau_a": 3.0, "tau_s": 2.0, "tau_k": 4.0, "n_k": 1.0},
     "HardStop": {"upper": 1.5},
+    "HarmonicTorque": {"harmonics": sw.Harmonics((1.0, 2.0), (1.5, 0.5))},
     "LossyGear": {"efficiency": 0.9},
     "PullOutDrive": {"s_k": 0.2},
 }

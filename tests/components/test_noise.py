@@ -18,8 +18,6 @@ import shaftwork as sw
 from shaftwork.components import noise
 from shaftwork.components.discontinuities import breakpoints, pieces_degree
 from shaftwork.components.law_slopes import slope
-from shaftwork.modelfiles.storage import write
-from shaftwork.network.expressions import parse
 
 FALSE_ALARM = 1e-6
 SIGMAS = NormalDist().inv_cdf(1 - FALSE_ALARM / 2)
@@ -117,11 +115,6 @@ def test_smooth_noise_written_in_held_noise_is_the_same() -> None:
     for form in (law, law.diff(sw.t)):
         direct, pieces = (sympy.lambdify(sw.t, made, modules=modules) for made in (form, form.pieces))
         np.testing.assert_allclose(pieces(PLACES[:601]), direct(PLACES[:601]), rtol=1e-13, atol=1e-13)
-
-
-@pytest.mark.parametrize("law", [sw.HeldNoise(sw.phi / 0.3 - 2, 4.0), 2 * sw.SmoothNoise(sw.t * sw.phi, 1.5) ** 2])
-def test_noise_is_written_and_read(law) -> None:
-    assert parse(write(law)) == law
 
 
 def test_noise_prints_as_a_letter_with_its_seed() -> None:

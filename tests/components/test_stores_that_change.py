@@ -16,6 +16,7 @@ from sympy import Piecewise, cos, sin
 
 import shaftwork as sw
 from shaftwork.components.branches import INTEGRAL, AcrossStore, Branch
+from shaftwork.components.shaft_models import ShaftModel
 from shaftwork.reduce import refer
 from shaftwork.studies import sweep
 
@@ -424,7 +425,7 @@ def test_what_has_no_equations_beside_it_is_refused_with_the_next_step() -> None
 
 @pytest.mark.slow
 def test_a_long_shaft_beside_it_is_the_same_in_array_code() -> None:
-    def train(model: sw.ShaftModel) -> sw.Network:
+    def train(model: ShaftModel) -> sw.Network:
         net = two_masses()
         net.add(sw.Shaft("line", length=20.0, diameter=0.05, model=model), "b", "c")
         net.add(sw.Inertia("wheel", J=1 + 0.3 * sin(sw.phi)), "c")

@@ -94,8 +94,8 @@ def box_around(segment: Segment) -> Box:
     return min(x1, x2), min(y1, y2), max(x1, x2), max(y1, y2)
 
 
-def check(net: sw.Network, *, as_circuit: bool, expected: dict[str, set[str]]) -> None:
-    drawing = net.draw(as_circuit=as_circuit, values=True)
+def check(net: sw.Network, *, as_circuit: bool, expected: dict[str, set[str]], analogy: str = "force-current") -> None:
+    drawing = net.draw(as_circuit=as_circuit, analogy=analogy, values=True)
     parts = [group for group in drawing.groups if group.name.startswith("part ")]
     boxes = [box for group in parts for box in boxes_of(group)]
     overlapping = [(a, b) for a, b in combinations(boxes, 2) if meet(a, b)]
@@ -133,6 +133,33 @@ def test_the_drawing_of_a_random_network_has_its_connections_and_no_overlap(
 ) -> None:
     net = network_of(pieces)
     check(net, as_circuit=as_circuit, expected=nodes_of(net))
+
+
+@given(networks(min_parts=5, max_inertias=12))
+def test_the_drawing_of_a_dual_has_its_connections_and_no_overlap(pieces: Network) -> None:
+    net = network_of(pieces)
+    try:
+        dual = net.dual()
+    except sw.NetworkError:
+        return
+    check(net, as_circuit=True, expected=nodes_of(dual), analogy="force-voltage")
+
+
+def test_a_dual_has_the_letters_of_its_drive_train() -> None:
+    net = sw.scenes.shaft_chain(m=2)
+    words = {group.name: [text.words for text in group.texts] for group in
+             net.draw(as_circuit=True, analogy="force-voltage").groups}  # fmt: skip
+    assert words["part motor"] == [r"$\tau_{e}$"]
+    assert words["part J1"] == ["$J_{1}$"]
+    assert words["part c1"] == ["$1/c_{1}$"]
+
+
+def test_an_analogy_that_is_none_or_no_circuit_is_refused() -> None:
+    net = sw.scenes.shaft_chain(m=2)
+    with pytest.raises(sw.ParameterError, match="must be 'force-current' or 'force-voltage'"):
+        net.draw(as_circuit=True, analogy="impedance")  # type: ignore[arg-type]
+    with pytest.raises(sw.ParameterError, match="as_circuit=True"):
+        net.draw(analogy="force-voltage")
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from shaftwork.components.branches import Branch, across_of
 from shaftwork.core.errors import CompileError
 from shaftwork.equations.second_order import second_order
 from tests.equations.networks import MECHANICAL, dc_drive, graph_of
-from tests.equations.test_lagrange import quantity
+from tests.lagrange.test_lagrange import quantity
 
 
 @pytest.mark.parametrize("name", MECHANICAL)

@@ -10,6 +10,7 @@ import pytest
 import sympy
 
 import shaftwork as sw
+from shaftwork.components.shaft_models import ShaftModel
 
 
 class OwnError(Exception):
@@ -26,7 +27,7 @@ ERRORS = (
 )
 
 
-def train(*loads: sw.Component, model: sw.ShaftModel | None = None) -> sw.Network:
+def train(*loads: sw.Component, model: ShaftModel | None = None) -> sw.Network:
     """Two inertias and what is between them: a spring, or a shaft with a model."""
     net = sw.Network("train")
     net.add(sw.TorqueSource("motor", tau=50.0 - 2.0 * sw.omega), "a")

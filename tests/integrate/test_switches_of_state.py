@@ -259,3 +259,22 @@ def test_a_speed_that_dies_away_turns_until_it_is_rounding(d: float) -> None:
     sol = net.simulate(3.0, engine="heyoka")
     assert sol["shaft.tau"][-1] == pytest.approx(20.0, rel=1e-9)
     assert sol["J.omega"][-1] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.slow
+def test_a_law_of_the_speed_acts_from_where_a_long_shaft_brings_the_first_motion() -> None:
+    """The far end moves by rounding at first, which turns its speed to and fro; the fan must follow what comes then."""
+    net = sw.Network("fan behind shafts")
+    net.add(sw.TorqueSource("motor", tau=5000.0), "rotor")
+    net.add(sw.Inertia("J", J=53.0), "rotor")
+    net.add(sw.Spring("coupling", c=1.2e5, d=200.0), "rotor", "hub")
+    net.add(sw.Inertia("hub", J=1.5), "hub")
+    for name, ends, diameter in (("first", ("hub", "flange"), 0.12), ("second", ("flange", "fan"), 0.13)):
+        shaft = sw.Shaft(name, length=2.5, diameter=diameter, damping=161.0, model=sw.Spectral(6))
+        net.add(shaft, *ends)
+    net.add(sw.Inertia("J_fan", J=38.0), "fan")
+    net.add(sw.FanLoad("fan", tau_n=5000.0, n_n=900.0), "fan")
+    motion = net.simulate(0.03, engine="heyoka")
+    other = net.simulate(0.03, engine="scipy", rtol=1e-10)
+    assert motion.energy_residual < 1e-12  # of rounding; the fan on the wrong side is 1e-5
+    np.testing.assert_allclose(motion["J_fan.omega"], other["J_fan.omega"], atol=1e-9)  # of scipy's tolerance

@@ -16,6 +16,7 @@ from hypothesis import assume, given, reject
 from hypothesis import strategies as st
 
 from shaftwork.components.laws import SYMBOLS, Ramp, Step, omega, phi, t, v
+from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.components.tables import Table
 from shaftwork.core.errors import ModelFileError
 from shaftwork.modelfiles.storage import write
@@ -146,7 +147,17 @@ def test_a_text_means_what_python_means(text: str, expected: sympy.Expr) -> None
     assert parse(text) == expected
 
 
-@pytest.mark.parametrize("law", [Step(5.0, start=1.5), Ramp(3, 2.0, before=-1), MOTOR(v) * t, sympy.Max(0, t, omega)])
+@pytest.mark.parametrize(
+    "law",
+    [
+        Step(5.0, start=1.5),
+        Ramp(3, 2.0, before=-1),
+        MOTOR(v) * t,
+        sympy.Max(0, t, omega),
+        HeldNoise(phi / 0.3 - 2, 4.0),
+        2 * SmoothNoise(t * phi, 1.5) ** 2,
+    ],
+)
 def test_the_laws_of_the_package_read_back_as_themselves(law: sympy.Expr) -> None:
     assert parse(write(law)) == law
 

@@ -10,7 +10,7 @@ import pytest
 import shaftwork as sw
 from shaftwork.cli import DONE, main
 from tests.beds import bed_of, registered
-from tests.pipeline.test_phase_models import clutches
+from tests.hybrid.test_phase_models import clutches
 
 SPEEDS = {"phi": "omega", "s": "v", "psi": "u"}
 STANDING = {"Ground"}

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import shaftwork as sw
+from shaftwork.components.shaft_models import ShaftModel
 from tests.pipeline.test_starts_of_shafts import GEOMETRY, MESHES
 
 MODELS = (*MESHES, sw.Wave())
@@ -22,7 +23,7 @@ each_model = pytest.mark.parametrize("model", MODELS, ids=str)
 some_models = pytest.mark.parametrize("model", [sw.Lumped(3), sw.CentralDifference(4), sw.Wave()], ids=str)
 
 
-def driven(model: sw.ShaftModel, speed: Any = SPEED, **shaft: float) -> sw.Network:
+def driven(model: ShaftModel, speed: Any = SPEED, **shaft: float) -> sw.Network:
     """A prescribed speed, a shaft and an inertia."""
     net = sw.Network("driven")
     net.add(sw.SpeedSource("drive", omega=speed), "a")
@@ -39,7 +40,7 @@ def assert_turns_as_one(sol: sw.Solution, *shafts: str, speed: float = SPEED) ->
 
 @pytest.mark.slow
 @each_model
-def test_a_shaft_starts_as_one_with_a_prescribed_speed_and_an_inertia(model: sw.ShaftModel) -> None:
+def test_a_shaft_starts_as_one_with_a_prescribed_speed_and_an_inertia(model: ShaftModel) -> None:
     sol = driven(model).simulate(SPAN, initial={"J.omega": SPEED})
     assert np.abs(sol["J.omega"] - SPEED).max() < ROUNDING
     assert_turns_as_one(sol)
@@ -47,7 +48,7 @@ def test_a_shaft_starts_as_one_with_a_prescribed_speed_and_an_inertia(model: sw.
 
 @pytest.mark.slow
 @each_model
-def test_a_loaded_shaft_starts_as_it_stays(model: sw.ShaftModel) -> None:
+def test_a_loaded_shaft_starts_as_it_stays(model: ShaftModel) -> None:
     """A damper takes 40 N m at the end, with which the shaft is wound up all along."""
     net = driven(model)
     net.add(sw.ViscousLoad("load", d=4.0), "b")
@@ -58,7 +59,7 @@ def test_a_loaded_shaft_starts_as_it_stays(model: sw.ShaftModel) -> None:
 
 
 @each_model
-def test_a_source_that_moves_on_does_so_as_from_rest(model: sw.ShaftModel) -> None:
+def test_a_source_that_moves_on_does_so_as_from_rest(model: ShaftModel) -> None:
     """No speed is distinguished: what turns with 10 rad/s and is then sped up has the torques of a start from rest."""
     rise, times = sw.Ramp(5.0, duration=SPAN), np.linspace(0, SPAN, 41)
     at_rest = driven(model, rise).simulate(SPAN, t_eval=times)
@@ -69,7 +70,7 @@ def test_a_source_that_moves_on_does_so_as_from_rest(model: sw.ShaftModel) -> No
 
 
 @each_model
-def test_speeds_run_straight_from_a_source_to_another_speed(model: sw.ShaftModel) -> None:
+def test_speeds_run_straight_from_a_source_to_another_speed(model: ShaftModel) -> None:
     sol = driven(model).simulate(1e-6, initial={"J.omega": 4.0}, t_eval=[0.0, 1e-6])
     expected = SPEED - 6.0 * sol.places["line.omega"] / GEOMETRY["length"]
     np.testing.assert_allclose(sol["line.omega"][0], expected, rtol=ROUNDING)
@@ -78,7 +79,7 @@ def test_speeds_run_straight_from_a_source_to_another_speed(model: sw.ShaftModel
 
 @some_models
 @pytest.mark.parametrize("named", ["a.omega", "drive.omega", "b.omega", "brake.omega"])
-def test_a_shaft_between_two_sources_starts_as_one_with_the_one_that_is_named(model: sw.ShaftModel, named: str) -> None:
+def test_a_shaft_between_two_sources_starts_as_one_with_the_one_that_is_named(model: ShaftModel, named: str) -> None:
     net = sw.Network("two sources")
     net.add(sw.SpeedSource("drive", omega=SPEED), "a")
     net.add(sw.Shaft("line", **GEOMETRY, model=model), "a", "b")
@@ -87,7 +88,7 @@ def test_a_shaft_between_two_sources_starts_as_one_with_the_one_that_is_named(mo
 
 
 @some_models
-def test_a_source_behind_a_gear_counts_by_the_speed_of_the_shaft(model: sw.ShaftModel) -> None:
+def test_a_source_behind_a_gear_counts_by_the_speed_of_the_shaft(model: ShaftModel) -> None:
     net = sw.Network("geared")
     net.add(sw.SpeedSource("drive", omega=3 * SPEED), "fast")
     net.add(sw.Gear("gear", ratio=3.0), "fast", "a")
@@ -98,7 +99,7 @@ def test_a_source_behind_a_gear_counts_by_the_speed_of_the_shaft(model: sw.Shaft
 
 
 @some_models
-def test_shafts_in_a_row_start_as_one_where_the_node_between_is_given(model: sw.ShaftModel) -> None:
+def test_shafts_in_a_row_start_as_one_where_the_node_between_is_given(model: ShaftModel) -> None:
     net = driven(model)
     net.add(sw.Shaft("second", **GEOMETRY, model=model), "b", "c")
     net.add(sw.Inertia("J2", J=0.1), "c")
@@ -106,7 +107,7 @@ def test_shafts_in_a_row_start_as_one_where_the_node_between_is_given(model: sw.
 
 
 @some_models
-def test_a_source_relative_to_a_given_speed_counts_by_both(model: sw.ShaftModel) -> None:
+def test_a_source_relative_to_a_given_speed_counts_by_both(model: ShaftModel) -> None:
     net = sw.Network("relative")
     net.add(sw.Inertia("J1", J=0.3), "frame")
     net.add(sw.SpeedSource("drive", omega=4.0), "a", "frame")
@@ -115,7 +116,7 @@ def test_a_source_relative_to_a_given_speed_counts_by_both(model: sw.ShaftModel)
     assert_turns_as_one(net.simulate(SPAN, initial={"J1.omega": 6.0, "J.omega": SPEED}))
 
 
-def planets(model: sw.ShaftModel | None, sun: Any) -> sw.Network:
+def planets(model: ShaftModel | None, sun: Any) -> sw.Network:
     """The sun takes ring and carrier along at once; a shaft is behind the carrier."""
     net = sw.Network("planets")
     net.add(sw.SpeedSource("drive", omega=sun), "sun")
@@ -129,7 +130,7 @@ def planets(model: sw.ShaftModel | None, sun: Any) -> sw.Network:
 
 
 @some_models
-def test_a_given_speed_counts_as_it_is_beside_a_source(model: sw.ShaftModel) -> None:
+def test_a_given_speed_counts_as_it_is_beside_a_source(model: ShaftModel) -> None:
     """All three members of the planetary gear turn alike, and the shaft with them."""
     initial = {"J2.omega": SPEED, "J3.omega": SPEED}
     assert_turns_as_one(planets(model, SPEED).simulate(SPAN, initial=initial))
@@ -146,7 +147,7 @@ def test_a_wave_is_no_inertia_where_a_source_jolts_at_the_start(initial: dict[st
 
 @pytest.mark.slow
 @pytest.mark.parametrize("model", MESHES, ids=str)
-def test_beside_a_wave_a_mesh_starts_as_without_it(model: sw.ShaftModel) -> None:
+def test_beside_a_wave_a_mesh_starts_as_without_it(model: ShaftModel) -> None:
     """The two shafts turn apart: what is stored in the one is not touched by the other."""
     initial = {"J1.omega": 4.0, "J2.omega": -2.0, "line.tau": 5.0}
     net = sw.Network("mixed")

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import shaftwork as sw
+from shaftwork.components.shaft_models import ShaftModel
 from tests.properties.examples import share_of_examples
 
 GEOMETRY = {"length": 1.7, "diameter": 0.031}
@@ -28,7 +29,7 @@ MESHES = (
 TORQUES = st.floats(-1e3, 1e3).filter(lambda torque: abs(torque) > 1e-3)
 
 
-def pair(model: sw.ShaftModel, **shaft: float) -> sw.Network:
+def pair(model: ShaftModel, **shaft: float) -> sw.Network:
     """Two discs and a shaft between them."""
     net = sw.Network("pair")
     net.add(sw.Inertia("J1", J=0.05), "a")
@@ -37,7 +38,7 @@ def pair(model: sw.ShaftModel, **shaft: float) -> sw.Network:
     return net
 
 
-def held(model: sw.ShaftModel, torque: float, stiffness: float | None) -> sw.Network:
+def held(model: ShaftModel, torque: float, stiffness: float | None) -> sw.Network:
     """A torque on a shaft whose other end is held, by itself or by a spring."""
     net = sw.Network("held")
     net.add(sw.TorqueSource("motor", tau=torque), "a")
@@ -58,7 +59,7 @@ def start(net: sw.Network, initial: dict[str, float]) -> sw.Solution:
 @pytest.mark.slow
 @share_of_examples(0.05)
 @given(st.sampled_from(MESHES), TORQUES, st.sampled_from([0.0, 4.0]), st.sampled_from([-5.0, 0.0, 0.3]))
-def test_a_torque_stands_all_along_the_shaft(model: sw.ShaftModel, torque: float, damping: float, speed: float) -> None:
+def test_a_torque_stands_all_along_the_shaft(model: ShaftModel, torque: float, damping: float, speed: float) -> None:
     """Inside, with the dampers' part; at the ends less the share of the mesh's inertia; to rounding."""
     sol = start(pair(model, damping=damping), {"line.tau": torque, "J1.omega": speed, "J2.omega": 0.0})
     size = abs(torque) + damping * abs(speed) / GEOMETRY["length"]
@@ -102,7 +103,7 @@ def test_a_wound_up_shaft_lets_go_alike_in_all_models() -> None:
 
 
 @pytest.mark.parametrize("model", MESHES[1:])
-def test_the_torque_of_one_end_of_a_mesh_is_refused_for_that_along_the_shaft(model: sw.ShaftModel) -> None:
+def test_the_torque_of_one_end_of_a_mesh_is_refused_for_that_along_the_shaft(model: ShaftModel) -> None:
     """What is read at an end counts the inertia that the mesh has there, so it would not be what was asked."""
     for name in ("line.tau_a", "line.tau_b"):
         with pytest.raises(sw.ParameterError, match=r"initial=\{'line.tau': ...\}"):
@@ -110,7 +111,7 @@ def test_the_torque_of_one_end_of_a_mesh_is_refused_for_that_along_the_shaft(mod
 
 
 @pytest.mark.parametrize(("model", "reason"), [(sw.Wave(), "one torque all along"), (sw.OneSpring(), "contradicts")])
-def test_two_torques_are_refused_where_there_is_one(model: sw.ShaftModel, reason: str) -> None:
+def test_two_torques_are_refused_where_there_is_one(model: ShaftModel, reason: str) -> None:
     for one, other in (("tau_a", "tau_b"), ("tau", "tau_b")):
         with pytest.raises(sw.ParameterError, match=reason):
             start(pair(model), {f"line.{one}": 5.0, f"line.{other}": 2.0})
@@ -125,7 +126,7 @@ def test_a_torque_beside_all_states_of_another_motion_contradicts_them() -> None
 @pytest.mark.slow
 @share_of_examples(0.05)
 @given(st.sampled_from((*MESHES[1:], sw.Wave())), TORQUES, st.sampled_from([0.5, 3.0, 7.1]))
-def test_a_wound_up_shaft_behind_a_gear_contradicts_nothing(model: sw.ShaftModel, torque: float, ratio: float) -> None:
+def test_a_wound_up_shaft_behind_a_gear_contradicts_nothing(model: ShaftModel, torque: float, ratio: float) -> None:
     net = pair(model, friction=0.01)
     net.add(sw.Gear("gear", ratio=ratio), "b", "c")
     net.add(sw.Shaft("second", **GEOMETRY, model=model), "c", "d")
@@ -142,7 +143,7 @@ HOLDING = (*MESHES, *(sw.Spectral(n) for n in range(3, 25, 3)), sw.Lumped(40), s
 @pytest.mark.slow
 @share_of_examples(0.05)
 @given(st.sampled_from(HOLDING), st.sampled_from([1e-3, 20.0, 1000.0]), st.sampled_from([None, 300.0, 1e5]))
-def test_a_drive_comes_to_rest_under_load(model: sw.ShaftModel, torque: float, stiffness: float | None) -> None:
+def test_a_drive_comes_to_rest_under_load(model: ShaftModel, torque: float, stiffness: float | None) -> None:
     """The torque is that of the motor all along, and the speeds are rounding of the energy that it has wound up."""
     found = held(model, torque, stiffness).compile().steady_state()
     torques = np.array([value for name, value in found.items() if ".tau" in name])
@@ -152,7 +153,7 @@ def test_a_drive_comes_to_rest_under_load(model: sw.ShaftModel, torque: float, s
 
 
 @pytest.mark.parametrize("model", [sw.Lumped(9), sw.Spectral(8)])
-def test_a_drive_without_load_coasts_to_standstill(model: sw.ShaftModel) -> None:
+def test_a_drive_without_load_coasts_to_standstill(model: ShaftModel) -> None:
     net = pair(model)
     net.add(sw.ViscousLoad("load", d=0.5), "b")
     found = net.compile().steady_state(initial={"J1.omega": 10.0, "J2.omega": 10.0, "line.tau": 3.0})

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 import shaftwork as sw
 from shaftwork.codegen.model_observer import ModelObserver
 from shaftwork.codegen.state_transfer import StateTransfer
+from shaftwork.components.shaft_models import ShaftModel
 from tests.properties.examples import compiled, network_of, share_of_examples
 from tests.strategies import Network, networks
 from tests.trains import Train, trains
@@ -133,7 +134,7 @@ def test_start_values_are_met_with_all_else_at_rest_or_refused_with_names_that_w
 @given(networks(min_parts=4, max_inertias=6), st.sampled_from(MESHES), st.sampled_from([0.0, 4.0]), st.data())
 @share_of_examples(0.03)
 def test_start_values_beside_a_shaft_are_met_or_refused_with_names_that_work(
-    pieces: Network, mesh: sw.ShaftModel, damping: float, data: st.DataObject
+    pieces: Network, mesh: ShaftModel, damping: float, data: st.DataObject
 ) -> None:
     net = network_of(pieces)
     rotors = st.sampled_from([piece.nodes[0] for piece in pieces if piece.type == "Inertia"])

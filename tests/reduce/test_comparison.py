@@ -10,7 +10,7 @@ import sympy
 
 import shaftwork as sw
 from shaftwork.latex.document import PREAMBLE
-from tests.equations.test_latex import compile_latex, compiles, overfull
+from tests.latex.test_equations_in_print import compile_latex, compiles, overfull
 from tests.reduce.test_simplify import chain
 
 

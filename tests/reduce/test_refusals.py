@@ -16,6 +16,7 @@ from shaftwork.reduce.kinematics import Scale
 VALUES: dict[str, dict[str, Any]] = {
     "CageMotor": {"tau_a": 5310.0, "tau_s": 4350.0, "tau_k": 5550.0, "tau_n": 2410.0, "n_n": 985.0, "n_sync": 1000.0},
     "HardStop": {"upper": 0.1},
+    "HarmonicTorque": {"harmonics": sw.Harmonics((0.5, 2.0), (1.5, 0.7), (0.3, -1.0))},
     "TorqueSource": {"tau": 3 * sw.omega + sw.phi**2 + sw.t},
     "ForceSource": {"f": 3 * sw.v + sw.s},
     "PullOutDrive": {"tau_k": 9.0, "s_k": 0.2, "n_sync": 3000.0},
@@ -29,6 +30,8 @@ VALUES: dict[str, dict[str, Any]] = {
 }
 ONE_WAY = {"AveragedBLDC", "BLDCMotor", "Hoist", "InductionMachine"}
 """They have a direction, one node and no sign that could turn it."""
+BY_TURNS = {"HarmonicTorque"}
+"""Their law counts the turns of their own shaft, and whole orders of one are none of another."""
 ALONG_A_LINE = {"Rope"}
 """There is no such part that turns."""
 BUILT_IN = {name: kind for name, kind in REGISTRY.items() if kind.__module__.startswith("shaftwork.")}
@@ -47,6 +50,9 @@ def test_every_mechanical_component_is_referred_or_refused(name: str) -> None:
     kind = BUILT_IN[name]
     if any(port.domain in (ROTATION, TRANSLATION) for port in kind.ports):
         domain = TRANSLATION if name in ALONG_A_LINE else ROTATION
+        if name in BY_TURNS:
+            assert "its law is not that of any such part behind a gear" in seen(kind, Scale(2.0), domain)
+            return
         assert isinstance(seen(kind, Scale(-2.5), domain), str) is (name in ONE_WAY)
         # a machine of one pole pair is one of two pairs at half its speed, and there is none of two and a half
         assert not isinstance(seen(kind, Scale(2.0), domain), str)

@@ -9,7 +9,7 @@ import pytest
 
 import shaftwork as sw
 from shaftwork.latex.document import PREAMBLE
-from tests.equations.test_latex import compile_latex, compiles, overfull
+from tests.latex.test_equations_in_print import compile_latex, compiles, overfull
 
 
 @cache

@@ -120,6 +120,6 @@ def test_a_brake_that_locks_a_place_which_all_modes_move_leaves_equations_to_com
     held = [row.modes for row in after.phases if row.modes["brake"] == "locked"]
     assert held == [row.modes for row in before.phases if row.modes["brake"] == "locked"]
     assert held
-    assert model.phases.assembly(("stuck",)).model.rows is not None
+    assert model.equation_sets.of(("stuck",)).model.rows is not None
     # two runs of an engine at 1e-8, with the instant of locking found by each
     assert after["c3.tau"] == pytest.approx(before["c3.tau"], abs=1e-6 * np.abs(before["c3.tau"]).max())

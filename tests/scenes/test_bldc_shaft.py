@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import shaftwork as sw
+from shaftwork.components.shaft_models import ShaftModel
 from shaftwork.scenes.long_shafts import RATED_TORQUE
 
 T_END = sw.scenes.SCENES["bldc-shaft"].t_end
@@ -16,12 +17,12 @@ DISTRIBUTED = sw.Spectral(8)
 
 
 @cache
-def compiled(shaft: sw.ShaftModel) -> sw.Model:
+def compiled(shaft: ShaftModel) -> sw.Model:
     return sw.scenes.bldc_shaft(model=shaft).compile()
 
 
 @cache
-def motion(J_m: float, shaft: sw.ShaftModel = DISTRIBUTED) -> sw.Solution:
+def motion(J_m: float, shaft: ShaftModel = DISTRIBUTED) -> sw.Solution:
     return compiled(shaft).simulate(T_END, parameters={"Jm.J": J_m})
 
 
@@ -42,7 +43,7 @@ def test_lumped_and_distributed_shafts_move_alike(J_m: float) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("shaft", [DISTRIBUTED, sw.Lumped(20), sw.OneSpring()], ids=str)
 @pytest.mark.parametrize("J_m", INERTIAS)
-def test_energy_is_kept_and_the_currents_sum_to_zero(J_m: float, shaft: sw.ShaftModel) -> None:
+def test_energy_is_kept_and_the_currents_sum_to_zero(J_m: float, shaft: ShaftModel) -> None:
     sol = motion(J_m, shaft)
     assert sol.energy_residual < 1e-9
     currents = np.array([sol[f"motor.i_{phase}"] for phase in "abc"])

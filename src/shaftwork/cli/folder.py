@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
 MANIFEST = "shaftwork.json"
 """The file that lists the others of the run."""
-PIXELS = 150
-"""Of a picture to an inch."""
 
 
 class Folder:
@@ -108,6 +106,6 @@ class Folder:
 def write_picture(path: Path, draw: Callable[[], Figure]) -> None:
     """Write a picture as PNG; where matplotlib is not installed, warn that it is left out."""
     try:
-        draw().savefig(path, dpi=PIXELS)
+        draw().savefig(path, dpi=150)
     except MissingExtraError as error:
         warnings.warn(f"{path.name} is left out. {error}", stacklevel=2)

@@ -13,7 +13,6 @@ from shaftwork.core.errors import ParameterError
 from shaftwork.core.files import write_rows
 
 HEAD = ("mode", "frequency [Hz]", "damping", "rate, real part [1/s]", "rate, imaginary part [1/s]", "moves most")
-SPEEDS = 61
 
 
 def modes_options(parser: ArgumentParser) -> None:
@@ -61,7 +60,7 @@ def campbell(options: Namespace, say: Say) -> Data:
             "such as --n-min 0 --n-max 3000."
         )
     folder = Folder(options.out, ("campbell.csv", "campbell.png"), options.line) if options.out else None
-    speeds = np.linspace(options.n_min, options.n_max, SPEEDS) * math.pi / 30
+    speeds = np.linspace(options.n_min, options.n_max, 61) * math.pi / 30
     moves = any(map(follows_speed, options.at)) and not options.steady
     at = partial(point, options.at) if moves else point_of(options, net)
     wanted = {"count": options.count, "exact": options.exact, "t": options.t}

@@ -65,7 +65,8 @@ def latex(options: Namespace, say: Say) -> Data:
 
     net, scene = load(options)
     phases = (options.phase,) if options.phase else (scene.phases if scene else ()) or (net.start_phase(),)
-    texts = [_typeset(net.equations(phase=phase or None), options) for phase in phases]
+    title = scene.title if scene else net.name
+    texts = [_typeset(net.equations(phase=phase or None), options, title) for phase in phases]
     if options.document:
         say(joined(texts))
         return {}
@@ -76,15 +77,16 @@ def latex(options: Namespace, say: Say) -> Data:
     return {}
 
 
-def _typeset(equations: Equations, options: Namespace) -> str:
+def _typeset(equations: Equations, options: Namespace, title: str) -> str:
     equations = equations.written_as(options.notation)
+    values, whole = options.values, options.document
     if options.form == "lagrange":
         from shaftwork.lagrange.lagrange import lagrangian
 
         lagrange = lagrangian(equations)
-        return (lagrange.document if options.document else lagrange.latex)(values=options.values)
-    typeset = equations.document if options.document else equations.latex
-    return typeset(options.form, values=options.values)
+        return lagrange.document(values=values, title=title) if whole else lagrange.latex(values=values)
+    form = options.form
+    return equations.document(form, values=values, title=title) if whole else equations.latex(form, values=values)
 
 
 def export_options(parser: ArgumentParser) -> None:

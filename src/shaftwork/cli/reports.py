@@ -45,7 +45,7 @@ def report_options(parser: ArgumentParser) -> None:
 @command("a report to be signed: drawings, equations, motion, extremes, as PDF and HTML", report_options)
 def report(options: Namespace, say: Say) -> Data:
     """The report of a scene or a model file."""
-    from shaftwork.reporting.document import report as made_of
+    from shaftwork.reporting.report import report as made_of
 
     net, scene = load(options)
     endings = [ending for ending in FORMATS if getattr(options, ending)] or ["pdf", "html"]

@@ -22,10 +22,6 @@ _OF_SPEED = re.compile(r"(-?)(?:(\d+\.?\d*|\.\d+)\s*\*\s*)?n(?:\s*/\s*(\d+\.?\d*
 _UNIT = re.compile(r"(?:[^\W\d]\w*+|(?:\*\*|\^) *[-+]?\d(?:\.\d+)?(?! *(?:\*\*|\^))|[*/() ·])*+")
 """Names of units, their products and quotients, and powers of one digit: the reader behind computes any other number,
 of any size."""
-MOST_CHARACTERS = 100
-"""Of a number with its unit."""
-MOST_VALUES = 1_000_000
-"""Of one parameter that is varied; more is a typing error."""
 
 
 def with_settings(net: Network, settings: Iterable[str]) -> Network:
@@ -75,10 +71,9 @@ def numbers(net: Network, text: str) -> tuple[str, list[Any]]:
     if len(ends) == 1:
         return name, [_value(name, declared, item) for item in written.split(",")]
     count = int(ends[2]) if len(ends) == 3 and re.fullmatch(r" *[0-9]{1,9} *", ends[2]) else 0
-    if not 2 <= count <= MOST_VALUES:
-        raise ParameterError(
-            f"{text}: write first:last:count with a count from 2 to {MOST_VALUES}, such as {name}=1:2:11."
-        )
+    most = 1_000_000  # more is a typing error
+    if not 2 <= count <= most:
+        raise ParameterError(f"{text}: write first:last:count with a count from 2 to {most}, such as {name}=1:2:11.")
     first, last = (declared.magnitude(_value(name, declared, end)) for end in ends[:2])
     if objection := first[1] or last[1]:
         raise ParameterError(f"{text}: {name} {objection}.")
@@ -207,11 +202,12 @@ def _quantity(name: str, text: str) -> Any:
         from pint import application_registry
     except ImportError:
         raise MissingExtraError("pint", "units", f"{name}={text} with a unit") from None
+    longest = 100  # characters
     number = _QUANTITY.fullmatch(text.strip())
     unit = "" if number is None else "percent" if number[2] else number[3] or number[4]
-    if number is None or len(text) > MOST_CHARACTERS or not _UNIT.fullmatch(unit):
+    if number is None or len(text) > longest or not _UNIT.fullmatch(unit):
         raise ParameterError(
-            f"{name}={text[:MOST_CHARACTERS]} is no number with a unit. Write the number, then units with * / and "
+            f"{name}={text[:longest]} is no number with a unit. Write the number, then units with * / and "
             "powers of one digit, such as '3 kg*m**2'."
         )
     try:

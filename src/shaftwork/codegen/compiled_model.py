@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from importlib.util import find_spec
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from sympy import Symbol, count_ops, cse
@@ -17,31 +17,17 @@ from sympy import Symbol, count_ops, cse
 from shaftwork.codegen.array_form.arrays import ArrayProgram, BoundArrays
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.code import branchwise, scalar
-from shaftwork.codegen.runs import MachineCode, RunProgram
+from shaftwork.codegen.looped_source import LoopedSource, MachineCode
+from shaftwork.codegen.time_switches import Switching
 from shaftwork.components.discontinuities import pieces_degree
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import CompileError, MissingExtraError, ParameterError
 from shaftwork.core.parameters import in_si, is_quantity, without_unit
-from shaftwork.formulation.explicit_rows import BlockTooLargeError, Rows, explicit_rows
+from shaftwork.formulation.explicit_rows import FEW_SETS, SCALAR, SWITCHING, BlockTooLargeError, Rows, explicit_rows
 from shaftwork.formulation.form import StateForm
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.kinds import Kind
-
-
-class Largest(NamedTuple):
-    """Up to how many states and branches unrolled code saves more than it costs to make."""
-
-    states: int
-    branches: int
-
-
-SCALAR, SWITCHING = Largest(64, 400), Largest(1200, 6000)
-"""Of all networks, and of those whose parts change their mode in few sets of equations: each event is looked at by
-itself, which takes arrays 50 times as long as scalar code. 65 states with 114 events: 1.2 s, then 0.03 s a run, and
-4.5 s by arrays; 385 states with 261 events: 4 s, then 0.7 s, and 15 s by arrays."""
-FEW_SETS = 4
-"""So many sets of equations are few."""
 
 
 @dataclass(frozen=True)
@@ -123,10 +109,14 @@ class CompiledModel:
     def __init__(self, form: StateForm) -> None:
         self.form = form
         self.parameters: Mapping[str, float] = MappingProxyType(dict(form.graph.parameters))
-        self.arrays = ArrayProgram(form)
         self.defaults = np.array(list(self.parameters.values()), dtype=float)
         self._bound = BoundedCache[bytes, BoundArrays](1)
         self._machine: MachineCode | None = None
+
+    @cached_property
+    def arrays(self) -> ArrayProgram:
+        """The equations as sparse matrices and nonlinear rows."""
+        return ArrayProgram(self.form)
 
     @cached_property
     def states(self) -> tuple[str, ...]:
@@ -251,14 +241,14 @@ class CompiledModel:
         return self.scalar.source
 
     @cached_property
-    def _loops(self) -> RunProgram:
+    def _loops(self) -> LoopedSource:
         title = self.form.graph.name
         if self.form.waves:
             raise CompileError(
                 f"'{title}' has travelling waves, whose equations need the past. Take model=Spectral(16)."
             )
         try:
-            return RunProgram(explicit_rows(self.form), title)
+            return LoopedSource(explicit_rows(self.form), title)
         except BlockTooLargeError:
             raise CompileError(
                 f"'{title}' has no right-hand side line by line: too many rates are coupled for symbols. "
@@ -309,6 +299,27 @@ class CompiledModel:
             f"phase = {getattr(name, 'name', name)!r}: the equations of '{self.form.graph.name}' are the same at all "
             "times. Take those of the model itself, such as model.rhs."
         )
+
+    @cached_property
+    def switching(self) -> Switching:
+        """What switches because of the time alone."""
+        return Switching(self.form)
+
+    def settled(self, p: Array) -> float:
+        """A time in s after which no law switches any more, for a parameter vector."""
+        return max((0.0, *self.switching.known(p))) + 1.0
+
+    @cached_property
+    def taylor_program(self) -> Any:
+        """The heyoka program, where there are rows, heyoka is installed and knows every function in them."""
+        if self.rows is None or find_spec("heyoka") is None:
+            return None
+        from shaftwork.codegen.taylor.heyoka import build
+
+        try:
+            return build(self.rows.states, TIME, self.rows.parameters, self.rows.rates)
+        except CompileError:
+            return None
 
     @cached_property
     def linear(self) -> bool:

@@ -10,13 +10,14 @@ from scipy import sparse
 from scipy.sparse.linalg import MatrixRankWarning, lsqr, splu
 
 from shaftwork.codegen.array_form.arrays import BoundArrays
-from shaftwork.codegen.array_form.elements import ROUNDING, Array
+from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.start_names import inner_nodes, node_of, speed_at
 from shaftwork.core.errors import SimulationError
 from shaftwork.core.notices import hint
 from shaftwork.formulation.form import StateForm
+from shaftwork.numerics.tolerances import EPS, SAME
 
-EPS, TINY = float(np.finfo(float).eps), float(np.finfo(float).tiny)
+TINY = float(np.finfo(float).tiny)
 AT_ONCE = 1e-12
 """A time, s, that is none beside any motion."""
 
@@ -72,7 +73,7 @@ def steady_state(bound: BoundArrays, start: Array, t: float, *, ends: Callable[[
     h = WAY.first
     for _ in range(WAY.steps):
         slopes = counted @ _slopes(bound, t, x, rate)
-        vanishing = ROUNDING * _rate_sizes(bound, t, x, slopes, length(x) / weights * (EPS / ROUNDING))
+        vanishing = SAME * _rate_sizes(bound, t, x, slopes, length(x) / weights * (EPS / SAME))
         settled = np.linalg.norm(step) <= WAY.standstill * np.linalg.norm(x)  # a drive that runs away is not steady
         if settled and (np.abs(rate) <= vanishing).all():
             return x
@@ -164,7 +165,7 @@ def lasting(bound: BoundArrays, x: Array, disturbed: Array, t: float) -> Array:
     """(n,) what a disturbance (n,) of a steady state (n,) leaves for ever: one long step of implicit Euler."""
     weights = energy_weights(bound)
     scaled = sparse.diags_array(weights) @ bound.jacobian(t, x) @ sparse.diags_array(1 / weights)
-    slow = ROUNDING * (float(abs(scaled).max()) if scaled.nnz else 0.0)
+    slow = SAME * (float(abs(scaled).max()) if scaled.nnz else 0.0)
     if not slow:
         return disturbed
     identity = sparse.eye_array(len(x), format="csc")

@@ -41,10 +41,10 @@ class WoundShaft:
     def wind(self, bound: BoundArrays, t: float, x: Array, torque: float, fixed: Any) -> None:
         """Give each store what the damper beside it leaves of a torque, but where (n,) states keep their values."""
         states = list(self.states)
-        beside = self.along(bound, t, x) - x[states]
+        beside = self.torques(bound, t, x) - x[states]
         x[states] = np.where(fixed[states], x[states], torque - beside)
 
-    def along(self, bound: BoundArrays, t: float, x: Array) -> Array:
+    def torques(self, bound: BoundArrays, t: float, x: Array) -> Array:
         """(stores,) the torque at each store with the damper beside it.
 
         What is read at the very ends counts inertia there, so it is not read; a store there has the damper of the next.
@@ -72,7 +72,7 @@ def speeds_inside(form: StateForm, given: GivenSpeeds) -> dict[int, float]:
     """For each state that is a speed inside a shaft, what lies on the straight line between those of its ends."""
     owner = {form.graph.branches[branch].plus: k for k, branch in enumerate(form.across_states)}
     speeds: dict[int, float] = {}
-    for nodes, places in _along(form):
+    for nodes, places in _nodes_along(form):
         first, last = given.at_ends(nodes[0], nodes[-1])
         for node, share in zip(nodes[1:-1], places[1:-1], strict=True):
             if node in owner:
@@ -82,7 +82,7 @@ def speeds_inside(form: StateForm, given: GivenSpeeds) -> dict[int, float]:
 
 def inner_nodes(form: StateForm) -> frozenset[int]:
     """The nodes inside shafts of several elements."""
-    return frozenset(node for nodes, _ in _along(form) for node in nodes[1:-1])
+    return frozenset(node for nodes, _ in _nodes_along(form) for node in nodes[1:-1])
 
 
 def node_of(form: StateForm, branch: int) -> int:
@@ -99,7 +99,7 @@ def speed_at(form: StateForm, node: int) -> str:
     return f"{graph.nodes[node]}.{graph.domains[node].across.name}"
 
 
-def _along(form: StateForm) -> Iterator[tuple[list[int], tuple[float, ...]]]:
+def _nodes_along(form: StateForm) -> Iterator[tuple[list[int], tuple[float, ...]]]:
     """The nodes along each shaft of several elements, and their places in m."""
     for part in form.graph.parts:
         for profile in part.component.profiles().values():
@@ -137,10 +137,10 @@ class StartNames:
         """The unit of every quantity by name."""
         units = dict(self._observer.units)
         units |= {state.name: state.unit for state in self._form.states}
-        return units | {name: unit for name, (unit, _) in self._observer.profiles.items() if name in self._along}
+        return units | {name: unit for name, (unit, _) in self._observer.profiles.items() if name in self._wound}
 
     @cached_property
-    def _along(self) -> Mapping[str, GraphPart]:
+    def _wound(self) -> Mapping[str, GraphPart]:
         """The parts that have a torque along them, by its name, as far as it can be given."""
         springs = {
             f"{part.name}.{name}": part
@@ -182,12 +182,12 @@ class StartNames:
         if name in quantities.nodes:
             number = quantities.nodes[name]
             return LinearQuantity(name, is_across=True, read=lambda h: np.asarray(h.potentials[number]))
-        if name in self._along:
-            part, profile = self._along[name], self._along[name].component.profiles()[name.rpartition(".")[2]]
+        if name in self._wound:
+            part, profile = self._wound[name], self._wound[name].component.profiles()[name.rpartition(".")[2]]
             return LinearQuantity(name, is_across=False, read=lambda h: h.profile(part, profile)[:, 0])
         return None
 
-    def along(self, name: str) -> str | None:
+    def torque_along(self, name: str) -> str | None:
         """The name of the torque along the shaft of several elements whose quantity this is, if it is another one."""
         owner = name.rpartition(".")[0]
         return next((other for other, shaft in self.shafts.items() if shaft.part.name == owner and other != name), None)
@@ -220,9 +220,9 @@ class StartNames:
         part = next((part for part in self._form.graph.parts if part.name == name.rpartition(".")[0]), None)
         quantity = self.quantity(name)
         is_across = quantity is not None and quantity.is_across
-        along = self.along(name)
-        if along is not None and not is_across:
-            return [along]
+        whole = self.torque_along(name)
+        if whole is not None and not is_across:
+            return [whole]
         stored = [] if part is None else self._stored(part, is_across=is_across)
         if part is not None and not is_across:
             stored = stored or self._stored(part, is_across=True)

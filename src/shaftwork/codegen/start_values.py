@@ -11,12 +11,13 @@ import numpy as np
 from scipy import linalg
 
 from shaftwork.codegen.array_form.arrays import BoundArrays
-from shaftwork.codegen.array_form.elements import SAME, Array
+from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.array_form.linear_readings import GivenSpeeds, LinearQuantity, LinearRow
 from shaftwork.codegen.array_form.recovery import BranchHistory
 from shaftwork.codegen.operating import AT_ONCE, energy_weights
 from shaftwork.codegen.start_names import StartNames, speeds_inside
 from shaftwork.core.errors import ParameterError
+from shaftwork.numerics.tolerances import TYPED
 from shaftwork.numerics.zeros import just_after
 
 
@@ -153,9 +154,9 @@ class Start:
             self._fixed[list(shaft.states)] = True
         self._meet([pair for pair in pairs if not pair[0].is_across], is_across=False)
         for name, shaft in shafts.items():
-            along = shaft.along(self._bound, self._t, self._x)
+            torques = shaft.torques(self._bound, self._t, self._x)
             size = max(abs(values[name]), np.abs(self._x[list(shaft.states)]).max())
-            self._refuse_other(name, float(along[np.abs(along - values[name]).argmax()]), size)
+            self._refuse_other(name, float(torques[np.abs(torques - values[name]).argmax()]), size)
 
     def _linear(self, name: str) -> LinearQuantity:
         quantity = self._names.quantity(name)
@@ -171,7 +172,7 @@ class Start:
         rows = np.array([row.by_state for _, row in demands]).reshape(len(demands), x.size)
         values = np.array([self._values[quantity.name] for quantity, _ in demands])
         slopes = np.abs(np.where(of_kind, rows, 0.0))
-        movable = free & (slopes > SAME * slopes.max(axis=1, keepdims=True, initial=0.0)).any(axis=0)
+        movable = free & (slopes > TYPED * slopes.max(axis=1, keepdims=True, initial=0.0)).any(axis=0)
         x[movable] += self._changes(rows[:, movable], values - constants - rows @ x, movable, is_across=is_across)
         self._fixed |= movable
         size = np.abs(np.append(rows * np.where(of_kind, x, 0.0), values)).max(initial=0.0)
@@ -187,12 +188,12 @@ class Start:
             ParameterError: the quantity is none to start from.
         """
         name, form = quantity.name, self._bound.program.form
-        if not quantity.is_across and self._names.along(name) is not None:
+        if not quantity.is_across and self._names.torque_along(name) is not None:
             raise self._refused(name, "is that of one end of a shaft of several elements")
         if row.moved:
             raise self._refused(name, "follows from laws or accelerations")
         sizes = np.abs(row.by_state) / energy_weights(self._bound)
-        sizes = np.where(sizes > SAME * sizes.max(initial=0.0), sizes, 0.0)
+        sizes = np.where(sizes > TYPED * sizes.max(initial=0.0), sizes, 0.0)
         if quantity.is_across and sizes[form.speeds.stop :].any():
             raise self._refused(name, "follows from torques, too")
         if not quantity.is_across and sizes.any() and not sizes[self._of_kind[False]].any():
@@ -215,16 +216,16 @@ class Start:
         changes: Array = np.zeros(rows.shape[1])
         if rows.size:
             scaled = rows / np.abs(rows).max(axis=1, keepdims=True).clip(np.finfo(float).tiny)
-            free = np.asarray(linalg.null_space(scaled, rcond=SAME))
+            free = np.asarray(linalg.null_space(scaled, rcond=TYPED))
             changes = np.asarray(np.linalg.lstsq(rows, gaps, rcond=None)[0])
-        along = stores.slopes @ free
-        moves = np.abs(along).max(axis=1, initial=0.0) > SAME * np.abs(stores.slopes).max(axis=1, initial=0.0)
+        free_slopes = stores.slopes @ free
+        moves = np.abs(free_slopes).max(axis=1, initial=0.0) > TYPED * np.abs(stores.slopes).max(axis=1, initial=0.0)
         rests = stores.is_free | moves
         if free.size:
             moved = stores.slopes[rests] @ changes + stores.offsets[rests]
-            changes = changes - free @ np.linalg.lstsq(along[rests], moved, rcond=None)[0]
+            changes = changes - free @ np.linalg.lstsq(free_slopes[rests], moved, rcond=None)[0]
         size = np.abs(np.append(changes, stores.offsets)).max(initial=0.0)
-        left = rests & (np.abs(stores.slopes @ changes + stores.offsets) > SAME * size)
+        left = rests & (np.abs(stores.slopes @ changes + stores.offsets) > TYPED * size)
         if left.any():
             raise self._shared([name for name, moving in zip(stores.names, left, strict=True) if moving])
         return np.asarray(changes)
@@ -258,7 +259,7 @@ class Start:
                 self._x[place], self._fixed[place] = speed, True
 
     def _refuse_other(self, name: str, reached: float, size: float) -> None:
-        if abs(reached - self._values[name]) > SAME * max(size, np.finfo(float).tiny):
+        if abs(reached - self._values[name]) > TYPED * max(size, np.finfo(float).tiny):
             others = ", ".join(other for other in self._values if other != name) or "its sources"
             raise ParameterError(
                 f"The start value {name} = {self._values[name]:g} contradicts {others}: with them it would be "

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.codegen.array_form.arrays import BoundArrays
-from shaftwork.codegen.array_form.elements import ROUNDING, SAME, Array
+from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.array_form.matrices import LinearPart
 from shaftwork.codegen.array_form.recovery import BranchHistory
 from shaftwork.core.calls import BoundedCache
@@ -36,6 +36,7 @@ from shaftwork.core.errors import CompileError
 from shaftwork.formulation.form import StateForm, store_name
 from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind
+from shaftwork.numerics.tolerances import SAME, TYPED
 
 
 class StateTransfer:
@@ -232,8 +233,6 @@ class StateTransfer:
         return {part: energy for part, energy in energies.items() if energy}
 
 
-LEAST = 1e-10
-"""What is added to the diagonal of a matrix of ones, so that of many solutions the least one is found."""
 WITHOUT_INERTIA = (Kind.CONDUCTANCE, Kind.LAW, Kind.THROUGH_STORE)
 """Kinds of tree branches whose across variables follow from torques."""
 
@@ -298,18 +297,19 @@ def complementary(W: Array, q: Array) -> Array | None:
         return None
     scale = np.where(scale > 0, 1 / np.sqrt(np.where(scale > 0, scale, 1.0)), 0.0)
     V, b = W * scale[:, None] * scale, q * scale
-    pressed = _pressed(V + LEAST * np.eye(len(q)), b)
+    # V has ones on its diagonal: with a little more there, the least of many solutions is found.
+    pressed = _pressed(V + 1e-10 * np.eye(len(q)), b)
     if pressed is None:
         return None
     shares = np.zeros(len(q))
-    shares[pressed] = np.linalg.lstsq(V[np.ix_(pressed, pressed)], -b[pressed], rcond=ROUNDING)[0]
-    keeps = V @ shares + b > -SAME * np.abs(b).max(initial=0.0)
+    shares[pressed] = np.linalg.lstsq(V[np.ix_(pressed, pressed)], -b[pressed], rcond=SAME)[0]
+    keeps = V @ shares + b > -TYPED * np.abs(b).max(initial=0.0)
     return np.maximum(shares, 0.0) * scale if keeps.all() else None
 
 
 def _pressed(V: Array, b: Array) -> NDArray[np.bool_] | None:
     """(m,) where lambda > 0, for a positive definite matrix; None where rounding hides it."""
-    least = ROUNDING * np.abs(b).max(initial=0.0)
+    least = SAME * np.abs(b).max(initial=0.0)
     impulses, active = np.zeros(len(b)), np.zeros(len(b), dtype=bool)
     for _ in range(3 * len(b) + 1):
         w = np.where(active, 0.0, V @ impulses + b)
@@ -324,7 +324,7 @@ def _pressed(V: Array, b: Array) -> NDArray[np.bool_] | None:
                 break
             shares = impulses[pulls] / (impulses[pulls] - wanted[pulls])
             impulses += shares.min() * (wanted - impulses)
-            active &= ~(pulls & (impulses <= ROUNDING * np.abs(impulses).max(initial=0.0)))
+            active &= ~(pulls & (impulses <= SAME * np.abs(impulses).max(initial=0.0)))
             impulses[~active] = 0.0
         impulses = wanted
     return None

@@ -14,7 +14,6 @@ from sympy import Expr, Min, Symbol, pi, sin
 from shaftwork.codegen.array_form.elements import Array, Index
 from shaftwork.codegen.code import scalar, vectorised
 from shaftwork.codegen.timeline import (
-    CLEARANCE,
     NOTHING,
     SEARCH,
     Sides,
@@ -32,6 +31,7 @@ from shaftwork.core.errors import ParameterError
 from shaftwork.formulation.form import StateForm
 from shaftwork.network.graph import GraphPart
 from shaftwork.network.kinds import Kind
+from shaftwork.numerics.tolerances import CLEARANCE
 
 DECADES = np.array([sign * 10.0**-place for place in range(1, 13) for sign in (-1, 1)])
 """Distances from a pulse that goes on far away, as parts of the run: no step gets from one to the next unawares."""
@@ -80,7 +80,7 @@ class _Switch:
             return []
         with np.errstate(all="ignore"):
             times = (levels - offset) / slope + 0.0
-            reach = CLEARANCE * np.finfo(float).eps * (np.abs(levels) + abs(offset)) / abs(slope)
+            reach = CLEARANCE / 2 * np.finfo(float).eps * (np.abs(levels) + abs(offset)) / abs(slope)
         return [(time, far) for time, far in zip(times.tolist(), reach.tolist(), strict=True) if math.isfinite(time)]
 
     def changes(self, p: Array, t0: float, t_end: float) -> list[tuple[float, float]] | None:

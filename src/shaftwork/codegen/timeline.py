@@ -14,9 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array, Index
-
-# Instants of a run keep this many rounding units of its latest time clear on each side: no solver takes shorter steps.
-CLEARANCE = 16
+from shaftwork.numerics.tolerances import CLEARANCE, GOLDEN
 
 
 @dataclass(frozen=True)
@@ -77,7 +75,7 @@ def timeline(places: Iterable[tuple[float, float]], t0: float, t_end: float, nar
         t_end: its end, s.
         narrow: times in s at which nothing jumps and yet a step is to end.
     """
-    clearance = CLEARANCE * math.ulp(max(abs(t0), abs(t_end)))
+    clearance = CLEARANCE / 2 * math.ulp(max(abs(t0), abs(t_end)))  # on each side of an instant
     spans = ((time, max(reach, clearance)) for time, reach in places)
     merged: list[tuple[float, float, float]] = []
     for low, time, high in sorted((time - reach, time, time + reach) for time, reach in spans):
@@ -138,7 +136,6 @@ PROBES = np.array([1.0, 1.5, 2.0, 3.0, 4.0])
 """Where the sides beside a change are looked at, in parts of its reach."""
 STOPS = np.linspace(-0.5, 1.5, 13)
 """Where steps end at a bump, in its widths: where it shows it is 1e-4 high, and began before."""
-GOLDEN = (math.sqrt(5) - 1) / 2
 Sides = Callable[[Array], Index]
 """From times (k,) to the sides of a switch (k,): numbers that differ where it jumps or bends."""
 
@@ -212,7 +209,7 @@ def _reach(sides: Sides, t: Array, times: Array, old: Index, new: Index, grain: 
     """How far from the times (k,) of changes the sides are the old and the new ones, whatever the rounding, in s."""
     gaps = np.diff(times, prepend=-np.inf, append=np.inf)
     farthest = np.minimum(SEARCH.farthest * (t[-1] - t[0]), np.minimum(gaps[:-1], gaps[1:]) / SEARCH.resolved)
-    reach = np.full(times.shape, CLEARANCE * grain)
+    reach = np.full(times.shape, CLEARANCE / 2 * grain)
     while True:
         offsets = reach[:, None] * PROBES
         early, late = np.maximum(times[:, None] - offsets, t[0]), np.minimum(times[:, None] + offsets, t[-1])

@@ -21,8 +21,6 @@ from shaftwork.network.netlist import title
 from shaftwork.network.templates import substitution
 from shaftwork.numerics.zeros import LOOKS, zero
 
-LONGEST = 60
-"""Characters of a law in a message."""
 WIDEST = 1 / np.finfo(float).eps
 """Largest ratio of an inertia along a motion: beyond it the smallest is lost in the rounding of the largest."""
 
@@ -163,5 +161,5 @@ def in_words(part: GraphPart, law: Basic) -> str:
     read = {name: as_expression(value).xreplace(names) for name, value in laws.items()}
     inside = [name for name, value in read.items() if law.has(value) or law.has(-value)]
     texts = [f"{name} = {laws[name]}" for name in inside or laws]
-    shown = [text if len(text) <= LONGEST else f"{text[:LONGEST]}..." for text in texts]
+    shown = [text if len(text) <= 60 else f"{text[:60]}..." for text in texts]
     return f"{' or '.join(shown) or 'the law'} of {title(component)}"

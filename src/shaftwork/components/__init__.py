@@ -13,6 +13,7 @@ FAMILIES = (
     "friction",
     "shafts",
     "sources",
+    "excitations",
     "loads",
     "bucket_wheel",
     "motors",

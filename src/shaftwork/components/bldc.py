@@ -31,8 +31,6 @@ from shaftwork.core.parameters import parameter
 PHASES = {"a": Integer(0), "b": 2 * pi / 3, "c": -2 * pi / 3}
 """By how much the electrical angle of each phase lags that of phase a."""
 OPEN = "open"
-DEAD = 1e-6
-"""Supply in V below which the share of pulses is as at this one: it drives no current."""
 EDGE = Rational(1, 2)
 """Sine of the angle at which a switch closes or opens: 30 degrees."""
 
@@ -164,7 +162,8 @@ def _bus(p: Any) -> Expr:
     if p.i_ref is None:
         return _supply(p)
     supply = _supply(p)
-    divisor = supply if supply.is_Symbol else larger(supply, DEAD)
+    # Below 1e-6 V the share of pulses stays as it is there: such a supply drives no current.
+    divisor = supply if supply.is_Symbol else larger(supply, 1e-6)
     return supply * PWM(_wanted(p) / divisor, p.f_c)
 
 

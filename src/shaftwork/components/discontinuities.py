@@ -21,8 +21,6 @@ from shaftwork.components.tables import TABLE_FUNCTIONS, Interpolation, Interpol
 
 EDGES = (sympy.exp, sympy.sinh, sympy.cosh, sympy.tanh, sympy.atan, sympy.Pow)
 """Functions that rise or fall in a small part of their argument's range; powers, where it or a fraction is in them."""
-FLANK = (-24.0, -8.0, -2.0, -0.5)
-"""Exponents at which steps end on the flank of a bell: e^-24 is below every tolerance, and the last is near the top."""
 
 
 def breakpoints(expression: sympy.Basic, values: Mapping[sympy.Symbol, float] | None = None) -> tuple[float, ...]:
@@ -149,7 +147,8 @@ def bells(expression: sympy.Basic, symbols: Sequence[sympy.Symbol]) -> Iterator[
         slopes = [node.args[0].diff(symbol) for symbol in symbols]
         tops = [slope for slope, symbol in zip(slopes, symbols, strict=True) if slope.has(symbol)]
         yield from ((top, (0.0,)) for top in tops)
-        yield from [(node.args[0], FLANK)] if tops else ()
+        # Steps end at these exponents on its flank: e^-24 is below every tolerance, and the last is near the top.
+        yield from [(node.args[0], (-24.0, -8.0, -2.0, -0.5))] if tops else ()
 
 
 def between_steps(expression: sympy.Expr) -> set[sympy.Symbol]:

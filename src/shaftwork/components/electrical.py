@@ -69,6 +69,32 @@ class Capacitor(Component):
 
 
 @component
+class Transformer(Component):
+    """An ideal transformer between the pairs of nodes p1, n1 and p2, n2.
+
+    Law: u_1 = ratio u_2, i_2 = -ratio i_1, with u_1 from p1 to n1 and i_1 what p1 gives to it. Mechanical analogue: a
+    gear.
+    """
+
+    ratio: float = parameter("1", "voltage u_1 over voltage u_2", nonzero=True, latex="n")
+
+    role: ClassVar[Role] = "coupling"
+    ports: ClassVar = tuple(Port(name, ELECTRICAL) for name in ("p1", "n1", "p2", "n2"))
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        yield IdealCoupling(((Integer(1), "p1", "n1"), (-p.ratio, "p2", "n2")))
+
+    def signals(self) -> dict[str, Signal]:
+        """Voltages and currents of both sides."""
+        return {
+            "u_1": Signal("across", ("p1", "n1"), ELECTRICAL),
+            "i_1": Signal("through", ("p1", None), ELECTRICAL),
+            "u_2": Signal("across", ("p2", "n2"), ELECTRICAL),
+            "i_2": Signal("through", ("p2", None), ELECTRICAL),
+        }
+
+
+@component
 class VoltageSource(Component):
     """A voltage from n to p. Law: u_p - u_n = u(t). The signal i is the current delivered at p."""
 

@@ -6,7 +6,7 @@ import contextlib
 import reprlib
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
@@ -25,8 +25,6 @@ MOST_SPECTRAL = 200
 @dataclass(frozen=True)
 class ShaftModel:
     """Base of the models."""
-
-    purpose: ClassVar[str] = ""
 
     @classmethod
     def read(cls, text: Any) -> ShaftModel:
@@ -58,14 +56,10 @@ class ShaftModel:
 class Rigid(ShaftModel):
     """No twist: the inertia of the shaft moves as one with what is at its ends."""
 
-    purpose: ClassVar[str] = "no twist; the shaft's inertia stays"
-
 
 @dataclass(frozen=True)
 class OneSpring(ShaftModel):
     """The stiffness of the whole shaft, and no inertia."""
-
-    purpose: ClassVar[str] = "one massless spring"
 
 
 @dataclass(frozen=True)
@@ -82,8 +76,6 @@ class Lumped(ShaftModel):
 
     m: int = 20
     ends: str = "half"
-
-    purpose: ClassVar[str] = "chain of m springs, half cells at its ends; second order"
 
     def __post_init__(self) -> None:
         _whole(self, "m", 1, MOST_ELEMENTS)
@@ -148,8 +140,6 @@ class CentralDifference(ShaftModel):
     second_difference: str = "consistent"
     form: str = "network"
 
-    purpose: ClassVar[str] = "speeds and torques at the same nodes; spurious modes"
-
     def __post_init__(self) -> None:
         _one_of(self, "form", ("network", "paper"))
         if self.form == "paper":
@@ -189,8 +179,6 @@ class Spectral(ShaftModel):
 
     n: int = 8
 
-    purpose: ClassVar[str] = "one polynomial; the error of the low modes falls exponentially"
-
     def __post_init__(self) -> None:
         _whole(self, "n", 1, MOST_SPECTRAL)
 
@@ -226,8 +214,6 @@ class Wave(ShaftModel):
 
     places: int = 5
 
-    purpose: ClassVar[str] = "travelling waves; exact without internal damping"
-
     def __post_init__(self) -> None:
         _whole(self, "places", 2, MOST_ELEMENTS)
 
@@ -247,8 +233,6 @@ class Auto(ShaftModel):
 
     f_max: float = 1000.0
     tolerance: float = 1e-3
-
-    purpose: ClassVar[str] = "the smallest spectral model that is right up to a frequency"
 
     def __post_init__(self) -> None:
         for name, unit, least, most in (("f_max", "Hz", 0.0, 1e12), ("tolerance", "1", 1e-12, 0.1)):

@@ -10,8 +10,6 @@ from contextlib import contextmanager
 from typing import Any, Generic, TypeVar
 
 Result = TypeVar("Result")
-PAUSE = 0.1
-"""Ctrl-C is noticed after so many seconds at most; where Python's waiting cannot be interrupted, as on Windows."""
 _LOCK = threading.Lock()
 _silent: dict[int, int] = {}
 """Threads that print nothing now, and how often each has entered."""
@@ -42,7 +40,7 @@ def interruptible(function: Callable[..., Result], *arguments: Any, **options: A
     thread = threading.Thread(target=work, daemon=True)
     thread.start()
     while thread.is_alive():
-        thread.join(PAUSE)
+        thread.join(0.1)  # s: on Windows Python's waiting cannot be interrupted, and Ctrl-C is noticed after it
     if "error" in outcome:
         raise outcome["error"]
     result: Result = outcome["result"]

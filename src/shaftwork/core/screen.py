@@ -11,8 +11,6 @@ from typing import Any
 
 LINES, COLUMNS = 25, 100
 """Size of the screen."""
-CHARACTER = 0.55 / 72
-"""Mean width of a character of one point of size, in: of the type of pictures."""
 Show = Callable[[float, str], None]
 """Told how much is done, and a word or two on it."""
 FORMAT = "{desc}: {percentage:3.0f}%|{bar}| {n:.4g} of {total:.4g} {unit} [{elapsed}<{remaining}]"
@@ -60,7 +58,8 @@ def in_lines(title: str, width: float, size: float = 12.0) -> str:
         width: of the picture, in.
         size: of the type, pt.
     """
-    return textwrap.fill(title, int(width / (CHARACTER * size)), break_on_hyphens=False)
+    character = 0.55 * size / 72  # mean width, in: a point is 1/72 in
+    return textwrap.fill(title, int(width / character), break_on_hyphens=False)
 
 
 def counted(number: int, what: str) -> str:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from shaftwork.core.domains import ROTATION
 from shaftwork.core.errors import MissingExtraError, ParameterError
 from shaftwork.drawing.items import Item
-from shaftwork.drawing.layout import HALF, LINE, Box, Placement, Spot
+from shaftwork.drawing.layout import SHEET, Box, Placement, Spot
 from shaftwork.drawing.placement import placed
 from shaftwork.drawing.strokes import THICK, THIN, Stroke, Text, circle, line, moved, rectangle
 from shaftwork.drawing.symbols import EARTH, FRAME, LENGTH, WHITE
@@ -24,10 +24,6 @@ from shaftwork.results.plotting import new_figure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MARGIN = 10.0
-"""Around the drawing, pt."""
-SIZE = 10.0
-"""Of letters, pt."""
 SIDES = {"left": "left", "centre": "center", "right": "right"}
 FORMATS = ("svg", "pdf", "png", "tex")
 
@@ -77,7 +73,8 @@ class Drawing:
                 left, bottom, right, top = box_of(text)
                 xs += [left, right]
                 ys += [bottom, top]
-        return min(xs) - MARGIN, min(ys) - MARGIN, max(xs) + MARGIN, max(ys) + MARGIN
+        margin = 10.0  # pt
+        return min(xs) - margin, min(ys) - margin, max(xs) + margin, max(ys) + margin
 
     def figure(self) -> Figure:
         """As a figure of matplotlib, in its own size.
@@ -187,7 +184,7 @@ def _tikz_text(text: Text) -> str:
 
 
 @lru_cache(maxsize=4096)
-def width_of(words: str, size: float = SIZE) -> float:
+def width_of(words: str, size: float = 10.0) -> float:
     """The width of a text, pt.
 
     Raises:
@@ -235,7 +232,7 @@ def _groups(result: Placement, graph: CircuitGraph, *, train: bool) -> Iterator[
     for spot in result.spots:
         yield DrawnGroup(f"part {spot.item.part}", tuple(_symbol(spot)), tuple(_texts(spot)))
     for box in result.boxes:
-        frame = rectangle(box.left, box.middle - HALF, box.right, box.middle + HALF, WHITE)
+        frame = rectangle(box.left, box.middle - SHEET.half, box.right, box.middle + SHEET.half, WHITE)
         yield DrawnGroup(f"part {box.item.part}", (frame,), tuple(_box_texts(box)))
     yield DrawnGroup("ends", (), tuple(result.pins))
 
@@ -251,10 +248,10 @@ def _texts(spot: Spot) -> Iterator[Text]:
     lines = item.lines
     if spot.turned:
         for k, words in enumerate(lines):
-            yield Text((x, y - 3.0 + LINE * (len(lines) - 1) / 2 - LINE * k), words, "left")
+            yield Text((x, y - 3.0 + SHEET.line * (len(lines) - 1) / 2 - SHEET.line * k), words, "left")
     else:
         for k, words in enumerate(reversed(lines)):
-            yield Text((x, y + 2.0 + LINE * k), words)
+            yield Text((x, y + 2.0 + SHEET.line * k), words)
     if item.shape.mark:
         middle = (spot.at[0], spot.at[1] - LENGTH / 2) if spot.turned else (spot.at[0] + LENGTH / 2, spot.at[1])
         yield Text((middle[0], middle[1] - 3.5), item.shape.mark)

@@ -14,8 +14,6 @@ End = int
 """The number of a node; `GROUND` is the frame or the reference."""
 MOST_LETTERS, MOST_VALUES = 2, 4
 """Parameters of a part whose letters stand beside it, and whose values do; one of more has its name alone."""
-MOST_ELEMENTS = 4
-"""Elements of a part beyond which its circuit is one box: a shaft of many elements, a machine with windings."""
 
 SHAPES: Mapping[str, str] = {
     "Inertia": "disc",
@@ -71,6 +69,7 @@ class Item:
         ends: the nodes that it joins, in the order of its ends.
         lines: of text beside it, with formulas between dollar signs.
         ports: of a part with more than two ends the name of each, by node.
+        below: what hangs from its second end, and ends at the reference.
     """
 
     part: str
@@ -78,6 +77,7 @@ class Item:
     ends: tuple[End, ...]
     lines: tuple[str, ...]
     ports: Mapping[End, str] = field(default_factory=dict)
+    below: Item | None = None
 
 
 @dataclass(frozen=True)
@@ -117,13 +117,18 @@ class Letters:
             yield ", ".join(f"${letter}$" for letter in letters)
         yield from self._mode(part)
 
-    def of_branch(self, branch: GraphBranch, part: GraphPart) -> Iterator[str]:
-        """The parameter that a law is alone, of springs and dampers its inverse; else the name of the part."""
+    def of_branch(self, branch: GraphBranch, part: GraphPart, *, dual: bool = False) -> Iterator[str]:
+        """The parameter that a law is alone, of springs and dampers its inverse; else the name of the part.
+
+        In the dual a damper has its own letter, and a resistor the inverse.
+        """
         law, kind = branch.template.law, branch.template.kind
         symbol = next((symbol for symbol in law.free_symbols if law in (symbol, -symbol, 1 / symbol)), None)
         name = "" if symbol is None or symbol.name not in part.component.declared else symbol.name
         letter = self._letter(part, name) if name in part.parameters else ""
-        inverse = law == symbol and kind in (Kind.THROUGH_STORE, Kind.CONDUCTANCE)
+        inverse = kind in (Kind.THROUGH_STORE, Kind.CONDUCTANCE) and (law == symbol) != (
+            dual and kind is Kind.CONDUCTANCE
+        )
         if not letter:
             yield plain(part.name)
         elif not self.values:
@@ -212,7 +217,8 @@ def circuit_items(letters: Letters) -> Iterator[Item]:
         branches = [graph.branches[k] for k in part.branches]
         inner = any(node not in (*ports, GROUND) for branch in branches for node in nodes_of(branch))
         symbol = symbol_of(part)
-        whole = "line" if symbol == "shaft" else "box" if len(branches) > MOST_ELEMENTS or inner else ""
+        # A part of more than four elements, such as a machine with windings, is one box.
+        whole = "line" if symbol == "shaft" else "box" if len(branches) > 4 or inner else ""
         whole = whole or ("diode" if symbol in ("diode", "freewheel") else "" if branches else "break")
         if whole:
             ends = (*ports, GROUND)[: max(2, len(ports))]

@@ -12,6 +12,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import networkx as nx
 import numpy as np
@@ -20,20 +21,30 @@ from shaftwork.drawing.items import End, Item
 from shaftwork.drawing.strokes import Point, Text
 from shaftwork.network.graph import GROUND
 
-SPACE = 8.0
-"""Between things that must not touch, pt."""
-RISE = 10.0
-"""Between lines that rise side by side, pt."""
-SMALL = 7.0
-"""Letters of the names of ends, pt."""
-LINE = 13.0
-"""Height of a line of text, pt."""
-HALF = 20.0
-"""Half of the height of a box, pt."""
-LEAD = 10.0
-"""From a shaft or wire to the symbol that hangs from it, pt."""
-WIDTH = 760.0
-"""A row that is longer goes on in the next one, pt: a page across."""
+
+class Sheet(NamedTuple):
+    """The lengths of a drawing, pt.
+
+    Args:
+        space: between things that must not touch.
+        rise: between lines that rise side by side.
+        small: size of the letters of the names of ends.
+        line: height of a line of text.
+        half: half of the height of a box.
+        lead: from a shaft or wire to the symbol that hangs from it.
+        width: a row that is longer goes on in the next one: a page across.
+    """
+
+    space: float = 8.0
+    rise: float = 10.0
+    small: float = 7.0
+    line: float = 13.0
+    half: float = 20.0
+    lead: float = 10.0
+    width: float = 760.0
+
+
+SHEET = Sheet()
 
 
 @dataclass
@@ -137,7 +148,9 @@ class Layout:
 
     def _sort(self, place: int, item: Item) -> None:
         alive = [end for end in item.ends if end != GROUND]
-        if len(alive) == 1 and len(item.ends) <= 2:
+        if item.below is not None:
+            self.shunts[item.ends[0]].append(item)
+        elif len(alive) == 1 and len(item.ends) <= 2:
             self.shunts[alive[0]].append(item)
         elif len(item.ends) == 2 and alive[0] != alive[1]:
             first, second = (("node", end) for end in item.ends)
@@ -151,7 +164,7 @@ class Layout:
     def order(self) -> tuple[Station, ...]:
         """The stations in a row."""
         graph = nx.Graph()
-        graph.add_nodes_from(dict.fromkeys(("node", end) for item in self.items for end in item.ends if end != GROUND))
+        graph.add_nodes_from(dict.fromkeys(("node", end) for item in self.items for end in _row_ends(item)))
         graph.add_nodes_from(self.boxes)
         graph.add_edges_from((joint.first, joint.second) for joint in self.joints)
         rows = [row(graph.subgraph(nodes)) for nodes in nx.connected_components(graph)]
@@ -180,6 +193,11 @@ class Layout:
             tracks[number] = track
             used[track].append((low, high))
         return tracks
+
+
+def _row_ends(item: Item) -> tuple[End, ...]:
+    """The nodes of an item that stand in the row: not those between what hangs below each other."""
+    return item.ends[:1] if item.below is not None else tuple(end for end in item.ends if end != GROUND)
 
 
 def row(graph: nx.Graph) -> tuple[Station, ...]:

@@ -8,13 +8,7 @@ from dataclasses import dataclass, field
 
 from shaftwork.drawing.items import End, Item
 from shaftwork.drawing.layout import (
-    HALF,
-    LEAD,
-    LINE,
-    RISE,
-    SMALL,
-    SPACE,
-    WIDTH,
+    SHEET,
     Box,
     Joint,
     Layout,
@@ -84,7 +78,7 @@ class _Placing:
             self.gaps.append((x, x + width))
             x = row.end = x + width
             passing = sum(low <= place < high for low, high in self.spans.values())
-            if x > WIDTH and place < last and passing == (place in self.direct):
+            if x > SHEET.width and place < last and passing == (place in self.direct):
                 self.rows.append(_Row())
                 x = 0.0
 
@@ -122,50 +116,62 @@ class _Placing:
         return x
 
     def _riser(self, number: int, station: Station, x: float) -> float:
-        self.leaves[number, station] = x + RISE / 2
-        self.touches[station[1]].append((x + RISE / 2, 1))
-        return x + RISE
+        self.leaves[number, station] = x + SHEET.rise / 2
+        self.touches[station[1]].append((x + SHEET.rise / 2, 1))
+        return x + SHEET.rise
 
     def _shunt(self, item: Item, node: End, x: float, row: _Row) -> float:
-        shape, text = item.shape, self._text_width(item)
+        shape = item.shape
         if shape.on_line:
-            half = max(text / 2, 12.0) + SPACE / 2
+            text = self._text_width(item)
+            half = max(text / 2, 12.0) + SHEET.space / 2
             row.result.spots.append(Spot(item, (x + half, 0.0), (x + half, shape.above + 3.0)))
             row.above = max(row.above, shape.above + _text_height(item))
             self.touches[node].append((x + half, 0))
             return x + 2 * half
-        centre = x + shape.below + SPACE / 2
-        begin, foot = (centre, -LEAD), (centre, -LEAD - LENGTH)
-        label = (centre + shape.above + 4.0, -LEAD - LENGTH / 2)
-        row.result.spots.append(Spot(item, begin, label, turned=True, mirrored=item.ends[0] == GROUND))
-        row.result.leads[node].append(((centre, 0.0), begin))
+        column = [item] if item.below is None else [item, item.below]
+        text = max(map(self._text_width, column))
+        centre = x + max(each.shape.below for each in column) + SHEET.space / 2
+        above, foot = node, (centre, 0.0)
+        label_x = centre + max(each.shape.above for each in column) + 4.0
+        for each in column:
+            begin = centre, foot[1] - SHEET.lead
+            row.result.leads[above].append((foot, begin))
+            above, foot = each.ends[-1], (centre, begin[1] - LENGTH)
+            mirrored = each.ends[0] == GROUND
+            label = (label_x, begin[1] - LENGTH / 2)
+            row.result.spots.append(Spot(each, begin, label, turned=True, mirrored=mirrored))
         row.result.grounds.append(foot)
         row.below = max(row.below, -foot[1])
         self.touches[node].append((centre, 1))
-        return label[0] + text + SPACE
+        return label_x + text + SHEET.space
 
     def _box(self, place: int, station: Station, x: float, row: _Row) -> float:
         item = self.layout.boxes[station]
         rising = [*self._rising(place, -1), *self._rising(place, 1)]
         name = max(map(self.layout.width_of, item.ports.values()), default=0.0)
-        apart = max(RISE, name + 3.0)
-        width = max(2 * HALF, 2 * name + SPACE, apart * (len(rising) + 1), self._text_width(item) + SPACE)
+        apart = max(SHEET.rise, name + 3.0)
+        width = max(
+            2 * SHEET.half, 2 * name + SHEET.space, apart * (len(rising) + 1), self._text_width(item) + SHEET.space
+        )
         start = x + (width - apart * (len(rising) - 1)) / 2
         for k, number in enumerate(rising):
             self.leaves[number, station] = start + apart * k
         row.result.boxes.append(Box(item, x, x + width, 0.0))
-        row.above, row.below = max(row.above, HALF), max(row.below, HALF)
+        row.above, row.below = max(row.above, SHEET.half), max(row.below, SHEET.half)
         if GROUND in item.ends:
-            row.result.grounds.append((x + width / 2, -HALF))
+            row.result.grounds.append((x + width / 2, -SHEET.half))
         return x + width
 
     def _gap_width(self, place: int) -> float:
         """As wide as the symbols and labels in the gap."""
-        width = SPACE
+        width = SHEET.space
         for number, home in self.home.items():
             item = self.layout.joints[number].item
             if home == place:
-                width = max(width, 3 * SPACE if item is None else max(LENGTH, self._text_width(item)) + 2 * SPACE)
+                width = max(
+                    width, 3 * SHEET.space if item is None else max(LENGTH, self._text_width(item)) + 2 * SHEET.space
+                )
         return width
 
     def _heights(self, row: _Row) -> None:
@@ -180,7 +186,7 @@ class _Placing:
                 below[track] = max(below[track], item.shape.below)
         row.tops = [0.0]
         for track in range(1, count):
-            row.tops.append(row.tops[-1] + above[track - 1] + below[track] + SPACE)
+            row.tops.append(row.tops[-1] + above[track - 1] + below[track] + SHEET.space)
         row.above, row.below = row.tops[-1] + above[-1], max(row.below, below[0])
 
     def _joint(self, number: int) -> None:
@@ -192,7 +198,7 @@ class _Placing:
         if track == 0:
             first, last = [(begin, y)], [(end, y)]
         else:
-            feet = [HALF if station in self.layout.boxes else 0.0 for station in (left, right)]
+            feet = [SHEET.half if station in self.layout.boxes else 0.0 for station in (left, right)]
             xs = self.leaves[number, left], self.leaves[number, right]
             first, last = ([(x, foot), (x, y)] for x, foot in zip(xs, feet, strict=True))
         if joint.item is None:
@@ -211,10 +217,10 @@ class _Placing:
         (x, y), rises = (first if left else last)[0], len(first) > 1
         words = self.layout.boxes[joint.second].ports[joint.node]
         if rises:
-            row.result.pins.append(Text((x, y - 9.0), words, "centre", SMALL))
+            row.result.pins.append(Text((x, y - 9.0), words, "centre", SHEET.small))
         else:
             beside = (x - 3.0, y + 2.0) if left else (x + 3.0, y + 2.0)
-            row.result.pins.append(Text(beside, words, "right" if left else "left", SMALL))
+            row.result.pins.append(Text(beside, words, "right" if left else "left", SHEET.small))
 
     def _wires(self) -> None:
         """The line of each node along its row, with dots where more than two lines meet."""
@@ -233,19 +239,19 @@ class _Placing:
         whole = Placement()
         y = between = 0.0
         for row in self.rows:
-            row.height = y = between - row.above - 2 * SPACE if row is not self.rows[0] else 0.0
-            between = y - row.below - 2 * SPACE
+            row.height = y = between - row.above - 2 * SHEET.space if row is not self.rows[0] else 0.0
+            between = y - row.below - 2 * SHEET.space
             whole.take(row.result, y)
         for place, number in self.direct.items():
             row, after = self.row_of[place], self.row_of[place + 1]
             if row is not after:
                 station = self.layout.order[place + 1]
                 node = self.layout.joints[number].node if station in self.layout.boxes else station[1]
-                right, left, between = row.end + LEAD, -2 * LEAD, row.height - row.below - 2 * SPACE
+                right, left, between = row.end + SHEET.lead, -2 * SHEET.lead, row.height - row.below - 2 * SHEET.space
                 corners = (right, row.height), (right, between), (left, between), (left, after.height)
                 whole.wires[node].append(((row.end, row.height), *corners, (0.0, after.height)))
         return whole
 
 
 def _text_height(item: Item) -> float:
-    return LINE * len(item.lines) + 3.0
+    return SHEET.line * len(item.lines) + 3.0

@@ -6,7 +6,7 @@ Nothing is multiplied out: a row is a left side and groups of terms under a comm
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -85,14 +85,18 @@ class Assembly:
 
     Args:
         form: the state form.
+        laws: coefficients by their branches that are written otherwise than their parts have them.
+        by_flow: links that stand in the state form by what their part lets through, although it follows from states.
     """
 
     form: StateForm
+    laws: Mapping[int, Expr] = field(default_factory=dict)
+    by_flow: frozenset[int] = frozenset()
 
     @cached_property
     def quantities(self) -> Quantities:
         """The symbols of the network."""
-        return Quantities(self.form.graph)
+        return Quantities(self.form.graph, self.laws)
 
     def ends(self, branch: int) -> tuple[int, int]:
         """First and second node of a branch."""
@@ -272,7 +276,7 @@ class Assembly:
             if self.kind(link) is left_out:
                 continue
             flow = self.quantities.flow_of.get(link)
-            if flow is not None and link in self.lumped:
+            if flow is not None and (link in self.lumped or link in self.by_flow):
                 terms[flow] = (-gain * flow.sign * self.quantities.through(flow),)
             elif flow is None:
                 terms[link] = (-gain * self.stored(link),)

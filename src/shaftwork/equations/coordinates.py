@@ -20,9 +20,8 @@ from shaftwork.equations.quantities import Quantities, ThroughQuantity, rate_of
 from shaftwork.formulation.gains import exactly, in_decimals
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch
 from shaftwork.network.kinds import Kind
+from shaftwork.numerics.tolerances import TYPED
 
-INDEPENDENT = 1e-9
-"""A coupling whose row is within this of the rows before it, in units of its own length, says nothing new."""
 Row = dict[int, Expr]
 
 
@@ -236,7 +235,7 @@ def _independent(rows: Mapping[int, Row], parameters: Mapping[str, float]) -> tu
         size = np.linalg.norm(new)
         for _ in range(2):  # twice is enough to be orthogonal to rounding
             new -= directions.T @ (directions @ new)
-        if (rest := np.linalg.norm(new)) > INDEPENDENT * size:
+        if (rest := np.linalg.norm(new)) > TYPED * size:
             independent.append(index)
             directions = np.vstack((directions, new / rest))
     return tuple(independent)

@@ -163,12 +163,16 @@ class Eliminated(Row):
 Origin = tuple[tuple[str, ...], tuple[int, ...], tuple[str, ...]]
 
 
-def kirchhoff(form: StateForm) -> Equations:
+def kirchhoff(form: StateForm, assembly: Assembly | None = None) -> Equations:
     """The equations of a network. Rows become sympy expressions when they are read, not before.
 
     Source: Popenda 2019, (1)-(4).
+
+    Args:
+        form: the state form.
+        assembly: makes their terms; by default that of the form.
     """
-    writer = _KirchhoffWriter(form)
+    writer = _KirchhoffWriter(form, assembly or Assembly(form))
     return Equations(
         form,
         writer.assembly,
@@ -179,15 +183,16 @@ def kirchhoff(form: StateForm) -> Equations:
         tuple(writer.states()),
         tuple(writer.eliminated()),
         tuple(writer.notes()),
+        from_assembly=partial(kirchhoff, form),
     )
 
 
 class _KirchhoffWriter:
     """Makes the records; all sympy work is put off by partial application."""
 
-    def __init__(self, form: StateForm) -> None:
+    def __init__(self, form: StateForm, assembly: Assembly) -> None:
         self.form, self.graph = form, form.graph
-        self.assembly = Assembly(form)
+        self.assembly = assembly
         self.solution = SolvedForm(self.assembly)
 
     def origin(self, branches: Iterable[int], nodes: Iterable[int] = ()) -> Origin:

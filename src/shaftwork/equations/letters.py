@@ -16,7 +16,7 @@ from shaftwork.equations.notations import Letter, Notation, parted
 from shaftwork.equations.quantities import Quantities, ThroughQuantity, running_number
 from shaftwork.equations.spelling import GREEK, chosen_subscript, escaped, indexed, split_index, without_marks
 from shaftwork.formulation.form import StateForm
-from shaftwork.network.graph import GraphBranch
+from shaftwork.network.graph import GROUND, GraphBranch, GraphPart
 from shaftwork.network.kinds import Kind
 
 WORDS = {
@@ -48,6 +48,7 @@ class Named:
             stem, index = split_index(str(self.chosen))  # `symbol=1` is a fair choice, and printing never fails
             return f"{chosen_subscript(stem)}{indexed(index)}"
         stem, index = split_index(self.name)
+        stem = stem.rstrip() if index else stem  # "mesh 1" is mesh, 1
         comma = "" if style and stem.endswith("_") else ","
         if style == 0:
             stem = self._short(stem, index)
@@ -66,13 +67,13 @@ class Named:
 
 
 def letters_of(
-    form: StateForm, quantities: Quantities, source: Notation
+    form: StateForm, quantities: Quantities, notation: Notation
 ) -> tuple[Mapping[str, str], tuple[Letter, ...]]:
-    """LaTeX of every symbol by name, and the letters of a source in the order of the parts, for the nomenclature.
+    """LaTeX of every symbol by name, and the letters of a notation in the order of the parts, for the nomenclature.
 
     Parts of one class whose names differ by a number are printed in one style, so that they stay a series.
     """
-    bearers = (*_parts(form, quantities, source), *_nodes(quantities, source))
+    bearers = (*_parts(form, quantities, notation), *_nodes(quantities, notation))
     series: dict[tuple[str, str], list[Named]] = {}
     for family, bearer in bearers:
         series.setdefault((family, split_index(bearer.name)[0]), []).append(bearer)
@@ -92,7 +93,7 @@ def letters_of(
     return printed, tuple(letters)
 
 
-def _parts(form: StateForm, quantities: Quantities, source: Notation) -> Iterator[tuple[str, Named]]:
+def _parts(form: StateForm, quantities: Quantities, notation: Notation) -> Iterator[tuple[str, Named]]:
     graph = form.graph
     variables: dict[int, list[Letter]] = {number: [] for number in range(len(graph.parts))}
     for number, letter in _quantity_letters(form, quantities):
@@ -100,7 +101,7 @@ def _parts(form: StateForm, quantities: Quantities, source: Notation) -> Iterato
     for number, part in enumerate(graph.parts):
         declarations = [part.component.declared[name] for name in part.parameters]
         parameters = parameter_letters(part.name, (*declarations, *part.derived))
-        letters = _distinct(map(source.written, (*parameters, *variables[number])))
+        letters = tuple(_told_apart(_distinct(map(notation.written, (*parameters, *variables[number])))))
         shortable = (*part.component.declared, *(letter.base for letter in letters))
         yield type(part.component).__name__, Named(part.name, letters, part.component.symbol, shortable)
 
@@ -129,7 +130,8 @@ def _quantity_letters(form: StateForm, quantities: Quantities) -> Iterator[tuple
         sign = "" if quantity is ELECTRICAL.across else r"\Delta "
         letter = _letter(pair.symbol, quantity, pair.label)
         meaning = f"{letter.meaning} across" if sign else letter.meaning
-        yield pair.part, replace(letter, base=sign + letter.base, meaning=meaning)
+        place = _between(graph.parts[pair.part], *ends)
+        yield pair.part, replace(letter, base=sign + letter.base, meaning=meaning, place=place)
     holding = {branch.part for branch in graph.branches if branch.terms and _numbered(quantities, branch)}
     for flow in quantities.flows:
         yield from ((flow.part, letter) for letter in _flow_letters(quantities, flow, holds=flow.part in holding))
@@ -140,7 +142,8 @@ def _quantity_letters(form: StateForm, quantities: Quantities) -> Iterator[tuple
             branch = graph.branches[state.branch]
             quantity = quantities.domain((branch.plus, branch.minus)).integral
             label = state.name.rsplit(".", 1)[1].removeprefix(quantity.name).removeprefix("_")
-            yield branch.part, _letter(quantities.integral(branch.index), quantity, label)
+            letter = _letter(quantities.integral(branch.index), quantity, label)
+            yield branch.part, replace(letter, place=_between(graph.part_of(branch.index), branch.plus, branch.minus))
 
 
 def _flow_letters(quantities: Quantities, flow: ThroughQuantity, *, holds: bool) -> Iterator[Letter]:
@@ -150,13 +153,17 @@ def _flow_letters(quantities: Quantities, flow: ThroughQuantity, *, holds: bool)
         holds: whether the part has a joint too, whose torque is another one.
     """
     quantity = quantities.domain((flow.plus, flow.minus)).through
-    letter = _letter(quantities.through(flow), quantity, flow.label)
+    ends = (flow.plus, flow.minus) if flow.sign > 0 or flow.minus == GROUND else (flow.minus, flow.plus)
+    place = _between(quantities.graph.parts[flow.part], *ends)
+    letter = replace(_letter(quantities.through(flow), quantity, flow.label), place=place)
     beside = holds and flow.label.isdecimal()
     yield replace(letter, meaning=f"{letter.meaning} of its law") if beside else letter
     for index in flow.branches if len(flow.branches) > 1 else ():
         template = quantities.graph.branches[index].template
         if template.kind is Kind.THROUGH_STORE:
-            yield _letter(quantities.store(index), quantity, template.label)
+            alone = _letter(quantities.store(index), quantity, template.label)
+            spring = "inductance" if quantity is ELECTRICAL.through else "spring"
+            yield replace(alone, meaning=f"{alone.meaning} of the {spring} alone", place=place)
 
 
 def _branch_letters(quantities: Quantities, branch: GraphBranch) -> Iterator[Letter]:
@@ -165,7 +172,8 @@ def _branch_letters(quantities: Quantities, branch: GraphBranch) -> Iterator[Let
         quantity = quantities.domain((branch.plus, branch.minus)).integral
         symbol = quantities.integral(branch.index)
         _, _, label = symbol.name.partition(f".{quantity.name}_")
-        yield _letter(symbol, quantity, label)
+        place = _between(quantities.graph.part_of(branch.index), branch.plus, branch.minus)
+        yield replace(_letter(symbol, quantity, label), place=place)
     if branch.template.is_history:
         line, _, end = branch.template.label.partition("_")
         meaning = f"torque wave that arrives at {end}"
@@ -175,6 +183,8 @@ def _branch_letters(quantities: Quantities, branch: GraphBranch) -> Iterator[Let
         quantity = quantities.multiplier_quantity(branch.index)
         letter = _letter(quantities.multiplier(branch.index), quantity, quantities.multiplier_label(branch.index))
         holds = _numbered(quantities, branch)
+        through = "" if letter.number else _between(quantities.graph.part_of(branch.index), *branch.terms[0][1:])
+        letter = replace(letter, place=f"that its coupling transmits {through}".rstrip())
         yield replace(letter, meaning=f"{letter.meaning} that holds it") if holds else letter
 
 
@@ -188,14 +198,38 @@ def _node_letters(quantities: Quantities) -> Iterator[tuple[int, Letter]]:
     graph = quantities.graph
     for node, branch in quantities.owners.items():
         domain, part = graph.domains[node], graph.branches[branch].part
-        label = graph.branches[branch].template.label
-        yield part, _letter(quantities.node(node), domain.across, label)
-        yield part, _letter(quantities.angle(node), domain.integral, label.removeprefix(f"{domain.across.name}_"))
+        label, place = graph.branches[branch].template.label, _between(graph.parts[part], node, GROUND)
+        of_angle = label.removeprefix(f"{domain.across.name}_")
+        yield part, replace(_letter(quantities.node(node), domain.across, label), place=place)
+        yield part, replace(_letter(quantities.angle(node), domain.integral, of_angle), place=place)
     for node, (part, port) in quantities.inner.items():
         domain, (stem, digits) = graph.domains[node], split_index(port)
         for symbol, quantity in ((quantities.node(node), domain.across), (quantities.angle(node), domain.integral)):
             letter = _letter(symbol, quantity, f"{stem}_{digits}")
-            yield part, replace(letter, meaning=f"{letter.meaning} of {stem}" if stem else letter.meaning)
+            words = " ".join(stem.split("_"))
+            yield part, replace(letter, meaning=f"{letter.meaning} of {words}" if words else letter.meaning)
+
+
+def _between(part: GraphPart, plus: int, minus: int) -> str:
+    """The place of a branch within its part by the names of its ports: "at b", "inside", "from leg a to winding a".
+
+    Numbers of ports are left out: letters that differ by a number alone have one meaning.
+    """
+    names = {node: " ".join(split_index(port)[0].split("_")) for port, node in part.nodes.items() if node != GROUND}
+    words = [names[node] for node in (plus, minus) if node in names]
+    if all(words):
+        return f"from {words[0]} to {words[1]}" if len(words) > 1 else f"at {words[0]}" if words else ""
+    return "inside"
+
+
+def _told_apart(letters: tuple[Letter, ...]) -> Iterator[Letter]:
+    """The letters of one part, with their places in their meanings where these are alike but for a number."""
+    alike: dict[str, set[tuple[str, ...]]] = {}  # only counted
+    for letter in letters:
+        alike.setdefault(letter.meaning, set()).add((letter.base, letter.mark, letter.number and "number"))
+    for letter in letters:
+        told = letter.parameter or len(alike[letter.meaning]) == 1 or not letter.place
+        yield letter if told else replace(letter, meaning=f"{letter.meaning} {letter.place}")
 
 
 def _letter(symbol: Symbol, quantity: Quantity, label: str = "") -> Letter:
@@ -225,7 +259,7 @@ def _distinct(letters: Iterable[Letter]) -> tuple[Letter, ...]:
     return tuple(sorted(by_latex.values(), key=lambda letter: order[letter.name]))
 
 
-def _nodes(quantities: Quantities, source: Notation) -> Iterator[tuple[str, Named]]:
+def _nodes(quantities: Quantities, notation: Notation) -> Iterator[tuple[str, Named]]:
     """Nodes whose speed is named after no part."""
     for number, name in enumerate(quantities.graph.nodes):
         if number not in quantities.owners and number not in quantities.inner:
@@ -234,7 +268,7 @@ def _nodes(quantities: Quantities, source: Notation) -> Iterator[tuple[str, Name
                 _letter(quantities.node(number), domain.across),
                 _letter(quantities.angle(number), domain.integral),
             )
-            yield f"node of {domain.name}", Named(name, tuple(map(source.written, letters)), None, ())
+            yield f"node of {domain.name}", Named(name, tuple(map(notation.written, letters)), None, ())
 
 
 def with_derived(values: Mapping[str, float], definitions: Mapping[Symbol, Expr]) -> dict[str, float]:

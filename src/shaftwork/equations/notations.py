@@ -34,6 +34,7 @@ class Letter:
         parameter: whether it is a parameter, with a value.
         owner: name of the part or node that it belongs to.
         number: running number within the part.
+        place: where within the part, in words, for parts with several quantities of one meaning.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Letter:
     parameter: bool = False
     owner: str = ""
     number: str = ""
+    place: str = ""
 
     def printed(self, subscript: str) -> str:
         """The symbol in LaTeX."""
@@ -161,16 +163,16 @@ NOTATIONS: Mapping[str, Notation] = {
 """The notations that equations are printed in by name."""
 
 
-def notation_of(source: str | Notation) -> Notation:
+def notation_of(name: str | Notation) -> Notation:
     """A notation by its name.
 
     Raises:
         ParameterError: there is no such one.
     """
-    if isinstance(source, Notation):
-        return source
-    if not isinstance(source, str) or source not in NOTATIONS:
+    if isinstance(name, Notation):
+        return name
+    if not isinstance(name, str) or name not in NOTATIONS:
         raise ParameterError(
-            f"There is no notation {source!r}. There are: {', '.join(map(repr, NOTATIONS))}; or give a Notation."
+            f"There is no notation {name!r}. There are: {', '.join(map(repr, NOTATIONS))}; or give a Notation."
         )
-    return NOTATIONS[source]
+    return NOTATIONS[name]

@@ -8,8 +8,8 @@ node a to its node b.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from sympy import Expr, Integer, Symbol
@@ -99,9 +99,11 @@ class Quantities:
 
     Args:
         graph: the circuit graph.
+        laws: coefficients by their branches that are written otherwise than their parts have them.
     """
 
     graph: CircuitGraph
+    laws: Mapping[int, Expr] = field(default_factory=dict)
 
     @cached_property
     def flows(self) -> tuple[ThroughQuantity, ...]:
@@ -132,6 +134,8 @@ class Quantities:
 
     def own_law(self, branch: int) -> Expr:
         """A law in parameters and derived quantities of the network, but not in what it reads of others."""
+        if branch in self.laws:
+            return self.laws[branch]
         record = self.graph.branches[branch]
         law: Expr = record.template.printed.xreplace(self._of_network[record.part])
         return law

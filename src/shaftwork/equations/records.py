@@ -26,9 +26,6 @@ if TYPE_CHECKING:
     from shaftwork.equations.small_motions.transfer import TransferFunction
     from shaftwork.latex.document import Form
 
-SHOWN = 5
-"""Rows of a kind that are shown on a screen."""
-
 
 class NamedPhase(Protocol):
     """A phase of a motion that has a name, "gap open, load stuck": a row of `Solution.phases`."""
@@ -85,8 +82,9 @@ class Equations:
         eliminated: dependent stores, speeds without a store, reactions of couplings and prescribed speeds.
         notes: what was left out or decided by numerical values, in words.
         phase: the mode of every part that changes its mode, "gap open, load stuck", for which the rows hold.
-        source: whose letters are printed.
+        notation: whose letters are printed.
         in_phase: from a phase to the equations there, where parts change their mode.
+        from_assembly: the same rows by another assembly.
     """
 
     form: StateForm
@@ -99,12 +97,13 @@ class Equations:
     eliminated: tuple[Eliminated, ...]
     notes: tuple[str, ...]
     phase: str = field(default="", kw_only=True)
-    source: Notation = field(default=OWN, kw_only=True)
+    notation: Notation = field(default=OWN, kw_only=True)
     in_phase: Callable[[str | NamedPhase], Equations] | None = None
+    from_assembly: Callable[[Assembly], Equations] = field(kw_only=True)
 
     @cached_property
     def _letters(self) -> tuple[Mapping[str, str], tuple[Letter, ...]]:
-        return letters_of(self.form, self.assembly.quantities, self.source)
+        return letters_of(self.form, self.assembly.quantities, self.notation)
 
     @cached_property
     def inverses(self) -> Mapping[Symbol, Symbol]:
@@ -272,7 +271,7 @@ class Equations:
         Raises:
             ParameterError: there is no such notation.
         """
-        return self if notation is None else replace(self, source=notation_of(notation))
+        return self if notation is None else replace(self, notation=notation_of(notation))
 
     def latex(
         self,
@@ -308,18 +307,19 @@ class Equations:
     def __str__(self) -> str:
         graph = self.form.graph
         phase = f", {self.phase}" if self.phase else ""
+        most = 5  # rows of a kind that are shown
         groups = (
-            ("balance", self.nodes, len(self.nodes) <= SHOWN),
-            ("loop", self.loops, len(self.loops) <= SHOWN),
-            ("coupling", self.couplings, len(self.couplings) <= SHOWN),
-            ("law", self.laws, len(self.laws) <= SHOWN),
+            ("balance", self.nodes, len(self.nodes) <= most),
+            ("loop", self.loops, len(self.loops) <= most),
+            ("coupling", self.couplings, len(self.couplings) <= most),
+            ("law", self.laws, len(self.laws) <= most),
         )
         sizes = ", ".join(counted(len(rows), word) for word, rows, _ in groups)
         title = f"Equations of '{graph.name}'{phase}: {sizes}"
         lines = named(counted(len(self.states), "state"), [row.name for row in self.states])
         lines += named("no states", [row.what for row in self.eliminated], most=2)
         for word, rows, few in groups:
-            shown = rows if few else rows[: SHOWN - 1]
+            shown = rows if few else rows[: most - 1]
             lines += [f"  {word} {', '.join(row.nodes or row.parts)}: {row.left} = {row.right}" for row in shown]
             lines += [] if few else [f"  ... and {len(rows) - len(shown)} more"]
         return on_one_screen(title, lines, len(lines))
@@ -327,18 +327,28 @@ class Equations:
     __repr__ = __str__
 
     def document(
-        self, form: Form | None = None, *, values: bool = False, notation: str | Notation | None = None
+        self,
+        form: Form | None = None,
+        *,
+        values: bool = False,
+        notation: str | Notation | None = None,
+        title: str | None = None,
     ) -> str:
         """A complete LaTeX document: the forms, the states with their units, and the nomenclature with the values.
 
         Args:
-            form: as in `latex`; by default all.
+            form: as in `latex`; by default all that the network has.
             values: print the parameters' values instead of their symbols.
             notation: letters of another source, as in `written_as`.
+            title: of the document; by default the name of the network.
+
+        Raises:
+            CompileError: there is no such form of this network, as for `latex`.
+            ParameterError: there is no such notation.
         """
         from shaftwork.latex.document import document
 
-        return document(self.written_as(notation), form, values=values)
+        return document(self.written_as(notation), form, values=values, title=title)
 
     def _repr_latex_(self) -> str:
         from shaftwork.latex.document import blocks_of, rendered

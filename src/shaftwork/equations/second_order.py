@@ -6,7 +6,7 @@ untwisted position. A node without inertia keeps its coordinate: its row of M is
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -161,8 +161,15 @@ class SecondOrder:
         return Add(*self.terms(row)) - self.forces[row].xreplace(dict(self.laws))
 
 
-def second_order(graph: CircuitGraph) -> SecondOrder:
+def second_order(
+    graph: CircuitGraph, quantities: Quantities | None = None, without: Collection[int] = ()
+) -> SecondOrder:
     """The second-order form of a network of rotating and translating parts.
+
+    Args:
+        graph: the circuit graph.
+        quantities: its symbols, where they are not the usual ones.
+        without: branches that are left out.
 
     Raises:
         CompileError: the network has electrical nodes; their equations are of first order. Or a law reads others.
@@ -174,9 +181,9 @@ def second_order(graph: CircuitGraph) -> SecondOrder:
             f"{', '.join(electrical[:6])}{', ...' if len(electrical) > 6 else ''}.{INSTEAD}"
         )
     refuse_controlled(graph)
-    at = coordinates(Quantities(graph))
+    at = coordinates(quantities or Quantities(graph))
     energies, forces = Energies(at), [list[Expr]() for _ in at.symbols]
-    energies.enter(graph.branches)
+    energies.enter(branch for branch in graph.branches if branch.index not in without)
     mass = _matrix(energies.inertias, at.velocities, forces, at.rate)
     damping = _matrix(energies.dampers, at.velocities, forces)
     stiffness = _matrix(energies.springs, at.symbols, forces)

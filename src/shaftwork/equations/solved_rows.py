@@ -16,7 +16,7 @@ from shaftwork.components.law_slopes import slope
 from shaftwork.components.laws import t as TIME
 from shaftwork.equations.assembly import Assembly, FactoredTerms, Sides, Terms, rising_first, sides
 from shaftwork.equations.quantities import rate_of
-from shaftwork.formulation.explicit_rows import LARGEST_BLOCK, solve_blocks
+from shaftwork.formulation.explicit_rows import LARGEST_BLOCK, congruence, solve_blocks
 from shaftwork.network.kinds import Kind
 
 Matrix = Mapping[tuple[int, int], Expr]
@@ -102,16 +102,19 @@ class SolvedForm:
     def torques(self) -> EliminationSystem:
         """d(through)/dt of the links' stores: compliances times torque rates."""
         assembly, form = self.assembly, self.assembly.form
-        matrix: dict[tuple[int, int], Expr] = {
-            (link, link): 1 / assembly.quantities.law(link) for link in form.through_states
-        }
+        compliances = {link: 1 / assembly.quantities.law(link) for link in form.through_states}
         loops: dict[int, list[tuple[int, Expr]]] = {}
         for link in form.through_states if form.dependent_through else ():
             for tree, gain in assembly.factors(link):
                 loops.setdefault(tree, []).append((link, gain))
-        for tree in form.dependent_through:
-            members = [(link, gain) for link, gain in assembly.cutsets.get(tree, ()) if (link, link) in matrix]
-            _add_products(matrix, loops.get(tree, []), members, 1 / assembly.quantities.law(tree))
+        springs = (
+            (
+                loops.get(tree, []),
+                1 / assembly.quantities.law(tree),
+                [(link, gain) for link, gain in assembly.cutsets.get(tree, ()) if link in compliances],
+            )
+            for tree in form.dependent_through
+        )
 
         def right(link: int) -> Terms:
             twist = assembly.in_place(assembly.around(link, without=Kind.THROUGH_STORE))
@@ -120,7 +123,7 @@ class SolvedForm:
         def symbol(link: int) -> Expr:
             return rate_of(assembly.quantities.store(link))
 
-        return EliminationSystem(form.through_states, matrix, right, symbol)
+        return EliminationSystem(form.through_states, congruence(compliances, springs), right, symbol)
 
     @cached_property
     def algebraic(self) -> EliminationSystem:
@@ -144,12 +147,16 @@ class SolvedForm:
     def _congruence(self, unknowns: tuple[int, ...], links: tuple[int, ...]) -> Matrix:
         """Coefficients of tree branches plus those of links referred to them."""
         quantities = self.assembly.quantities
-        matrix: dict[tuple[int, int], Expr] = {(tree, tree): quantities.law(tree) for tree in unknowns}
-        for link in links:
-            columns = [pair for pair in self.assembly.factors(link) if (pair[0], pair[0]) in matrix]
-            rows = [pair for pair in self.assembly.balanced(link) if (pair[0], pair[0]) in matrix]
-            _add_products(matrix, rows, columns, quantities.law(link))
-        return matrix
+        coefficients = {tree: quantities.law(tree) for tree in unknowns}
+        referred = (
+            (
+                [pair for pair in self.assembly.balanced(link) if pair[0] in coefficients],
+                quantities.law(link),
+                [pair for pair in self.assembly.factors(link) if pair[0] in coefficients],
+            )
+            for link in links
+        )
+        return congruence(coefficients, referred)
 
     def _prescribed_inertia(self, tree: int) -> Iterator[Expr]:
         """What a prescribed acceleration demands of an inertia that is geared to it and to the unknown."""
@@ -187,14 +194,3 @@ def _grouped(factor: Expr, terms: Terms) -> Iterator[FactoredTerms]:
             within.append(term)
     yield FactoredTerms(factor, rising_first(within))
     yield from beside
-
-
-def _add_products(
-    matrix: dict[tuple[int, int], Expr],
-    rows: Sequence[tuple[int, Expr]],
-    columns: Sequence[tuple[int, Expr]],
-    coefficient: Expr,
-) -> None:
-    for first, gain in rows:
-        for second, other in columns:
-            matrix[first, second] = matrix.get((first, second), Integer(0)) + gain * coefficient * other

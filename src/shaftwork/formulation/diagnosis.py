@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -18,7 +19,7 @@ from shaftwork.formulation.form import StateForm, state_form
 from shaftwork.formulation.gains import value_of
 from shaftwork.formulation.tree import column_of
 from shaftwork.formulation.value_diagnosis import extreme_ratios, notes_of, numeric_problems
-from shaftwork.formulation.view import View, controlled_problems, reads_itself, words_of
+from shaftwork.formulation.view import View, controlled_problems, domain_words, reads_itself
 from shaftwork.network.checks import LEFT_OUT, connection_problems, examine
 from shaftwork.network.graph import CircuitGraph, GraphBranch, GraphPart, build_graph
 from shaftwork.network.kinds import Kind
@@ -45,7 +46,9 @@ def diagnose(netlist: Netlist) -> tuple[CircuitGraph | None, StateForm | None, t
     Returns:
         Graph and state form, None where a part is wrong, and every problem: of parts, of connections, of equations.
     """
-    repaired, typed = examine(netlist)
+    # where modes are chosen, the network has passed the checks of its parts before
+    in_modes = any(placed.choices for placed in netlist.placed)
+    repaired, typed = (replace(netlist, ports=()), ()) if in_modes else examine(netlist)
     if not repaired.placed:
         return None, None, typed
     graph = build_graph(repaired)
@@ -193,7 +196,7 @@ class _Structure(View):
     def _undetermined_group(self, members: Sequence[int], at: Sequence[int]) -> Diagnostic:
         parts, nodes = [self.graph.parts[number] for number in at], self.nodes(members)
         domain = self.graph.domains[members[0]]
-        words, names = words_of(domain), tuple(part.name for part in parts)
+        words, names = domain_words(domain), tuple(part.name for part in parts)
         many = len(nodes) > 1
         if domain.name == "electrical":
             message = f"the circuit at {at_nodes(nodes)} ({listed(names)}) is joined to ground nowhere."

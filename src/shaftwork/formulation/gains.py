@@ -15,8 +15,8 @@ from zlib import crc32
 
 from sympy import Expr, Float, Integer, Mul, Rational, Symbol, cancel
 
-CANCELLATION = 1e-10
-"""A difference below this fraction of its terms is zero: ratios are typed to some ten digits (1.2 * 1.5 is 1.8)."""
+from shaftwork.numerics.tolerances import TYPED
+
 _OPERATIONS: Mapping[str, Callable[[Any, Any], Any]] = {
     "*": operator.mul,
     "+": operator.add,
@@ -84,9 +84,9 @@ def add(first: Number, second: Number, coincidences: list[Gain]) -> Number:
     if isinstance(first, int) and isinstance(second, int):
         return first + second
     total = _combined("+", first, second)
-    if abs(total.value) > CANCELLATION * max(abs(value_of(first)), abs(value_of(second))):
+    if abs(total.value) > TYPED * max(abs(value_of(first)), abs(value_of(second))):
         return total
-    if abs(total.probe) > CANCELLATION * max(abs(_probe(first)), abs(_probe(second))):
+    if abs(total.probe) > TYPED * max(abs(_probe(first)), abs(_probe(second))):
         coincidences.append(total)
     return 0
 
@@ -149,7 +149,7 @@ def any_sum_vanishes(gains: Iterable[Gain], values: Mapping[Expr, float]) -> boo
         sizes = [max(map(abs, fold(pair, values.__getitem__))) for pair in terms]
     except ZeroDivisionError:
         return True
-    return any(abs(total) <= CANCELLATION * size for total, size in zip(totals, sizes, strict=True))
+    return any(abs(total) <= TYPED * size for total, size in zip(totals, sizes, strict=True))
 
 
 def coefficients_in(gains: Iterable[Gain]) -> tuple[Expr, ...]:

@@ -22,9 +22,6 @@ from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import at_nodes, listed, title
 
-SINGULAR = 1e-13
-"""Reciprocal condition below which coupled values cancel, and a block of equations has no solution to speak of."""
-
 
 def numeric_problems(form: StateForm) -> tuple[Diagnostic, ...]:
     """Values that cancel each other or lie outside what a computer can represent, although the structure is sound."""
@@ -160,7 +157,8 @@ def is_singular(block: Any) -> bool:
     """Whether coupled values cancel in a matrix, whatever the sizes of its rows."""
     scale = 1 / np.sqrt(np.abs(np.diag(block)) + np.finfo(float).tiny)
     scaled = block * scale[:, None] * scale[None, :]
-    return not (np.isfinite(scaled).all() and 1 / np.linalg.cond(scaled) > SINGULAR)
+    # At a condition of 1e13 coupled values cancel, and the block has no solution to speak of.
+    return not (np.isfinite(scaled).all() and 1 / np.linalg.cond(scaled) > 1e-13)
 
 
 def _cancelling_block(view: View, branches: Sequence[int]) -> Diagnostic:
@@ -176,8 +174,6 @@ def _cancelling_block(view: View, branches: Sequence[int]) -> Diagnostic:
 
 _JOINTS = (Kind.THROUGH_STORE, Kind.COUPLING)
 """Springs and gears: what hands a torque on at standstill."""
-_SLIPPING_OR_STUCK = 3
-"""Modes of what rubs at all times: forward, backward, stuck; a brake has more."""
 
 
 def notes_of(graph: CircuitGraph) -> Iterator[Diagnostic]:
@@ -239,7 +235,8 @@ def _breakaway(graph: CircuitGraph, part: GraphPart, direction: float) -> float:
     if len([end for end in part.nodes.values() if end != GROUND]) > 1:
         return 0.0
     values = {Symbol(name, real=True): Float(graph.parameters[f"{part.name}.{name}"]) for name in part.parameters}
-    slips = (modes.options for modes in part.modes if len(modes.options) == _SLIPPING_OR_STUCK)
+    # What rubs at all times has three modes (forward, backward, stuck); a brake has more.
+    slips = (modes.options for modes in part.modes if len(modes.options) == 3)
     guards = (leave.when for options in slips for mode in options if mode.gives_way for leave in mode.leaves)
     limits = [-when.xreplace({THROUGH: Float(0), **values}) for when in guards if direction * when.diff(THROUGH) > 0]
     return sum(float(limit) for limit in limits if limit.is_comparable)

@@ -40,7 +40,7 @@ _WORDS = {
 }
 
 
-def words_of(domain: Domain) -> Words:
+def domain_words(domain: Domain) -> Words:
     """The words of a domain."""
     return _WORDS.get(domain.name, _WORDS["rotation"])
 
@@ -95,7 +95,7 @@ class View:
         """The words of the domain in which a branch lies."""
         ends = ends_of(self.graph.branches[branch])
         nodes = (node for _, plus, minus in ends for node in (plus, minus) if node != GROUND)
-        return next((words_of(self.graph.domains[node]) for node in nodes), _WORDS["rotation"])
+        return next((domain_words(self.graph.domains[node]) for node in nodes), _WORDS["rotation"])
 
 
 def reads_itself(view: View, law: int) -> bool:
@@ -164,7 +164,7 @@ def _unknown(view: View, law: int, reading: Reading) -> Iterator[Diagnostic]:
     if law in view.form.controlled:
         moving = [k for k in _deciding(view, trees) if view.kind(k) is Kind.LAW or k in view.form.controlled]
         if moving:
-            there = _words_of(view, reading)
+            there = _words_for(view, reading)
             message = (
                 f"{name} prescribes a {words.across} by the {there.across} of {at_nodes(nodes)}, which has no "
                 f"{there.store}: what it reads depends on {view.titles(moving)} at the same instant."
@@ -173,9 +173,9 @@ def _unknown(view: View, law: int, reading: Reading) -> Iterator[Diagnostic]:
             yield Diagnostic("controlled source", message, hint, view.parts((law, *moving)), nodes)
 
 
-def _words_of(view: View, reading: Reading) -> Words:
+def _words_for(view: View, reading: Reading) -> Words:
     """The words of the domain in which something is read."""
-    return words_of(view.graph.domains[reading.of]) if reading.kind == "across" else view.words(reading.of)
+    return domain_words(view.graph.domains[reading.of]) if reading.kind == "across" else view.words(reading.of)
 
 
 def _beside_a_store(view: View, law: int) -> Iterator[Diagnostic]:

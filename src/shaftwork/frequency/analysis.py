@@ -40,23 +40,46 @@ from shaftwork.results.solution import Solution
 
 SmallMotions = Callable[[Point, Time, Names], LinearModel | ExactModel]
 """From a point, a time and names of inputs to the network near that point."""
-NAMED = 4
-"""Values of a point that a title names."""
 
 
-def speeds_to_give(model: CompiledModel) -> Mapping[str, float | None]:
-    """The speeds that tell how a network turns, as multiples of the first; None where that does not tell them.
+def speeds_to_give(model: CompiledModel, reference: int | None = None) -> Mapping[str, float | None]:
+    """The speeds that tell how a network turns, as multiples of one; None where that does not tell them.
 
     What is tied rigidly to them follows, and so do the speeds inside shafts. Springs keep their twist, and what joins
     at times, as clutches, gaps and ropes do, is taken for joined: behind a gear of ratio 3 is a third. Behind a
     planetary gear of which one shaft is free, a speed is open.
+
+    Args:
+        model: the network.
+        reference: node of that one speed; by default of the first.
     """
     form = model.form
     inside = inner_nodes(form)
     nodes = dict.fromkeys(node_of(form, branch) for branch in form.across_states)
     named = [node for node in nodes if node not in inside and form.graph.domains[node] is not ELECTRICAL]
-    ratios = speeds_along(form.graph, named[0], _joints(form.graph)) if named else {}
+    start = reference if reference is not None or not named else named[0]
+    ratios = {} if start is None else turning_speeds(form.graph, start)
     return {speed_at(form, node): ratios.get(node) for node in named}
+
+
+def turning_speeds(graph: CircuitGraph, start: int) -> dict[int, float]:
+    """Speeds of the nodes over that of one while no twist changes; those that no joint ties follow by their dampers.
+
+    What hangs on a damper alone, as the ring of a viscous damper does, turns with its shaft.
+
+    Args:
+        graph: the network.
+        start: the node whose speed is 1.
+    """
+    joined = list(_joints(graph))
+    speeds = speeds_along(graph, start, joined)
+    dampers = (graph.branches[k] for part in graph.parts if part.component.role == "loss" for k in part.branches)
+    hanging = (
+        {branch.plus: 1.0, branch.minus: -1.0}
+        for branch in dampers
+        if branch.template.kind in (Kind.CONDUCTANCE, Kind.LAW) and not {branch.plus, branch.minus} <= speeds.keys()
+    )
+    return speeds_along(graph, start, [*joined, *hanging])
 
 
 def _joints(graph: CircuitGraph) -> Iterator[Mapping[int, float]]:
@@ -64,7 +87,8 @@ def _joints(graph: CircuitGraph) -> Iterator[Mapping[int, float]]:
     for part in graph.parts:
         branches = [graph.branches[k] for k in part.branches]
         kinds = {branch.template.kind for branch in branches}
-        if (part.modes and Kind.COUPLING not in kinds) or any(branch.template.is_history for branch in branches):
+        joined = bool(part.component.profiles()) or any(branch.template.is_history for branch in branches)
+        if joined or (part.modes and Kind.COUPLING not in kinds):  # of a long shaft, whatever is between its ends
             yield dict(zip((part.nodes[port.name] for port in part.component.ports), (1.0, -1.0), strict=False))
         for branch in branches:
             if branch.template.kind in (Kind.THROUGH_STORE, Kind.COUPLING):
@@ -198,7 +222,8 @@ def about(model: CompiledModel, at: Point, t: float) -> str:
     if isinstance(at, Solution):
         return f"at t = {at.t[0]:g} s of a motion" + ("" if t == at.t[0] else when)
     entries = [f"{name} = {briefly(value)}" for name, value in (at or {}).items()]
-    shown = ", ".join(entries if len(entries) <= NAMED else [*entries[: NAMED - 1], "..."])
+    most = 4  # values that a title names
+    shown = ", ".join(entries if len(entries) <= most else [*entries[: most - 1], "..."])
     return (f"at {shown}" if entries else "at rest") + when
 
 
@@ -272,7 +297,7 @@ def campbell(
         ParameterError: speeds or orders are not what they must be, or no point is given and it matters.
     """
     if at is None:
-        _refuse_no_point(model)
+        refuse_no_point(model, "A Campbell diagram")
 
     def modes(speed: float, f_max: float) -> tuple[Modes, str]:
         near = small_motions(at(speed) if callable(at) else at, t, ())
@@ -284,8 +309,12 @@ def campbell(
         return diagram.campbell(name, modes, speeds, orders, f_max, constant=not callable(at))
 
 
-def _refuse_no_point(model: CompiledModel) -> None:
-    """Refuse a diagram over speed of what swings otherwise where it runs, and is given no point.
+def refuse_no_point(model: CompiledModel, what: str) -> None:
+    """Refuse what is computed over speed of a network that swings otherwise where it runs, and is given no point.
+
+    Args:
+        model: the network.
+        what: is computed, "A Campbell diagram".
 
     Raises:
         ParameterError: it is such a network; names the parts, and points that may be meant.
@@ -303,7 +332,7 @@ def _refuse_no_point(model: CompiledModel) -> None:
     options = " ".join(f"--at {name}={value}" for name, value in speeds.items())
     first = next(iter(speeds))
     raise ParameterError(
-        f"A Campbell diagram of '{graph.name}' needs a point: how it swings depends on how it runs ({parts}). Give the "
+        f"{what} of '{graph.name}' needs a point: how it swings depends on how it runs ({parts}). Give the "
         "speeds of all inertias where the exciting shaft turns at n rad/s (here those where it is that of "
         f"'{first}'), "
         + hint(

@@ -21,8 +21,6 @@ from shaftwork.results.plotting import new_figure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-HEADROOM = 1.15
-"""The frequency axis ends so many times above the highest mode, where nobody says where."""
 LAWS = ", laws at t = "
 """Before the time at which laws are read, in what a title says of the point."""
 
@@ -134,7 +132,8 @@ def campbell(
     rows = [dict(zip(names[point.speed], point.frequencies.tolist(), strict=True)) for point in points]
     shown = tuple(dict.fromkeys(name for row in rows for name, frequency in row.items() if frequency <= top))
     table = np.array([[row.get(name, 0.0) for name in shown] for row in rows]).reshape(len(n), len(shown))
-    end = min(top, HEADROOM * float(table.max())) if f_max is None and table.any() else top
+    # some room above the highest mode
+    end = min(top, 1.15 * float(table.max())) if f_max is None and table.any() else top
     return Campbell(title, _about(title, points), n, lines, shown, table, tuple(inside), end)
 
 

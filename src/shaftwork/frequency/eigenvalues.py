@@ -22,8 +22,6 @@ from shaftwork.results.observer import Array, Complex
 
 LARGEST_DENSE = 1500
 """States up to which all eigenvalues are computed."""
-SMALL = 300
-"""States up to which that is cheaper than looking for a few of them."""
 ROUNDINGS = 8
 """Rounding errors within which two entries are the same."""
 ZERO = 1e-10
@@ -61,7 +59,8 @@ def _connected(matrix: Any, count: int | None) -> tuple[Complex, Complex]:
     """The modes of a network in one piece."""
     size = matrix.shape[0]
     lossless = _is_skew(matrix)
-    if size <= SMALL or (size <= LARGEST_DENSE and (count is None or 2 * count + 4 > size // 4)):
+    # Up to 300 states, all of them cost less than looking for a few.
+    if size <= 300 or (size <= LARGEST_DENSE and (count is None or 2 * count + 4 > size // 4)):
         return _all(matrix.toarray(), lossless=lossless)
     if count is None:
         raise ParameterError(

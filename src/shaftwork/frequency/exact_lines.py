@@ -35,9 +35,6 @@ import numpy as np
 from shaftwork.frequency.linearization import Linearization
 from shaftwork.results.observer import Array, Complex
 
-SMALL = 0.1
-"""Below this G^2 the slope of sinhc is taken from its series."""
-
 
 @dataclass(frozen=True, eq=False)
 class ExactLines:
@@ -79,7 +76,8 @@ class ExactLines:
         p, stiffer, square, cosh, sinhc = self._halves(s)
         half, damping = self.delay / 2, self.damping
         by_s = (4 * half * (2 * p + self.friction) - square * damping) / stiffer
-        small = np.abs(square) < SMALL
+        # Near zero the slope of sinhc is taken from its series.
+        small = np.abs(square) < 0.1
         series = np.exp(-np.sqrt(square).real / 2) * (1 / 24 + square / 960 + square**2 / 107520 + square**3 / 23224320)
         slope = np.where(small, series, (cosh - sinhc) / (2 * np.where(small, 1.0, square))) * by_s
         cosh_slope = sinhc / 8 * by_s

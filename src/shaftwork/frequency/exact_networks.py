@@ -39,13 +39,11 @@ from shaftwork.pipeline.model import Model
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
-    from shaftwork.hybrid.phased_model import PhasedModel
+    from shaftwork.hybrid.hybrid_model import HybridModel
 
 Compile = Callable[[Netlist], Model]
 OWN = Spectral(16)
 """The mesh in place of a wave where quantities are named and operating points are read."""
-PER_HALF_WAVE, BESIDES, REFINED = 2.0, 8, 1.4
-"""Degree of a mesh that starts a search to some nine digits: for each half wave, besides, and finer at each attempt."""
 MESHES = 4
 """Meshes that are kept for later points."""
 
@@ -60,7 +58,7 @@ def small_motions(model: Model, compiled: Compile, *, every: bool) -> SmallMotio
     """
     shafts = exact_shafts(model.netlist, every=every)
     if shafts and model.phased:
-        return ExactPhases(cast("PhasedModel", model), compiled, shafts).near
+        return ExactPhases(cast("HybridModel", model), compiled, shafts).near
     if shafts:
         return ExactNetwork(model, compiled, shafts).near
     return model.near
@@ -196,7 +194,8 @@ class ExactNetwork:
 
     def _meshed(self, radius: float, attempt: int) -> Model:
         waves = self.lines.half_waves(radius)
-        degrees = tuple(int(n) for n in np.ceil((PER_HALF_WAVE * waves + BESIDES) * REFINED**attempt))
+        # Two for each half wave and eight besides start a search to some nine digits; each attempt is finer.
+        degrees = tuple(int(n) for n in np.ceil((2.0 * waves + 8) * 1.4**attempt))
         if max(degrees) > MOST_SPECTRAL:
             shaft = self.lines.names[int(waves.argmax())]
             raise ParameterError(
@@ -217,15 +216,15 @@ class ExactPhases:
         shafts: the exact ones, by name, in the order of the network.
     """
 
-    def __init__(self, model: PhasedModel, compiled: Compile, shafts: Mapping[str, Shaft]) -> None:
+    def __init__(self, model: HybridModel, compiled: Compile, shafts: Mapping[str, Shaft]) -> None:
         self._model, self._compiled, self._shafts = model, compiled, shafts
         self._networks = BoundedCache[tuple[str, ...], ExactNetwork](MESHES)
 
     @cached_property
-    def _own(self) -> PhasedModel:
+    def _own(self) -> HybridModel:
         """The network with meshes in place of waves, which tells the modes at a point."""
         meshed = _without_waves(self._model, self._compiled, self._shafts)
-        return cast("PhasedModel", meshed)  # its other parts are the same
+        return cast("HybridModel", meshed)  # its other parts are the same
 
     def near(self, at: Point, t: Time = None, inputs: Names = ()) -> ExactModel:
         """The network near a point, in the modes that go on there; arguments as for `Model.linearize`.
@@ -235,21 +234,21 @@ class ExactPhases:
             SimulationError: a law has no finite slope at the point.
         """
         point, t = _on_meshes(at, t, self._model, self._own, tuple(self._shafts))
-        time, moment = self._own.moment_at({}, point, t)
-        modes = moment.regime.modes
+        time, state = self._own.hybrid_state_at({}, point, t)
+        modes = state.regime.modes
         network = self._networks(modes, lambda: ExactNetwork(self._in(modes), self._compiled, self._shafts))
-        phase = self._model.words(moment)
+        phase = self._model.words(state)
         title = titled(self._model.name, about(self._model, at, time), phase)
-        return network.around(time, moment.x, inputs, title, phase)
+        return network.around(time, state.x, inputs, title, phase)
 
     def _in(self, modes: tuple[str, ...]) -> Model:
         """The network in one phase."""
-        phases, chosen = self._model.phases, dict[str, tuple[ModeChoice, ...]]()
-        netlist = phases.assembly(modes).model.netlist
+        equation_sets, chosen = self._model.equation_sets, dict[str, tuple[ModeChoice, ...]]()
+        netlist = equation_sets.of(modes).model.netlist
         forms = {item.part.name: iter(item.choices) for item in netlist.placed}
-        for element, name in zip(phases.elements, modes, strict=True):
-            owner = element.part.name
-            choice = dataclasses.replace(next(forms[owner]), value=element.modes[name].value)
+        for machine, name in zip(equation_sets.machines, modes, strict=True):
+            owner = machine.part.name
+            choice = dataclasses.replace(next(forms[owner]), value=machine.modes[name].value)
             chosen[owner] = (*chosen.get(owner, ()), choice)
         with muted(NetworkWarning):
             return self._compiled(netlist.with_choices(chosen))

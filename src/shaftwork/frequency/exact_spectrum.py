@@ -20,24 +20,12 @@ from shaftwork.frequency.frequency_response import solved_densely
 from shaftwork.frequency.natural_modes import EQUAL, Modes, checked_count, largest_rate, modes_of, states_that_act
 from shaftwork.results.observer import Array, Complex, blocks
 
-ITERATIONS, CONVERGED, SETTLED = 30, 1e-15, 1e-9
-"""Steps to a root; found where a step is below the first fraction of it, or below the second and shrinks no more."""
-POINTS = (256, 512, 1024, 2048, 4096, 8192, 16384)
-"""Points on a half circle for the count of the roots in it; two numbers of points must agree."""
-WHOLE = 0.01
-"""A count is whole when it is nearer to a whole number than this."""
 MODES = 10
 """Modes where nobody says how many."""
 WIDER = 1.3
 """The mesh is right up to so many times the largest rate wanted: the circle for the count passes a gap between."""
 BELOW = 0.5
 """Modes are sought up to this fraction of the rate at which, without number, they crowd."""
-ROOM = 1.001
-"""A circle for a number of modes reaches so many times as far as the next one."""
-FADED, SINGULAR = 40.0, 1e13
-"""At the rate -FADED / T what fades grows to beyond rounding: the matrix then has this condition where none echoes."""
-AUDIBLE = 3.0
-"""Half waves up to which the count tells an end that takes all from one that throws back some rounding."""
 Starts = Callable[[float, int], Modes]
 """The modes of the network with meshes that are right for |rate| up to a radius, the finer the later the attempt."""
 
@@ -100,10 +88,11 @@ class ExactProblem:
             SimulationError: it does not become a whole number.
         """
         before = np.inf
-        for points in POINTS:
+        # Points on the half circle. Two numbers of points must agree, on nearly a whole number.
+        for points in (256, 512, 1024, 2048, 4096, 8192, 16384):
             s = radius * np.exp(1j * np.pi * (np.arange(points) + 0.5) / points)
             roots = float(self._turning(s).mean())
-            if abs(roots - before) < WHOLE and abs(roots - round(roots)) < WHOLE:
+            if abs(roots - before) < 0.01 and abs(roots - round(roots)) < 0.01:
                 return round(roots)
             before = roots
         raise SimulationError(
@@ -147,7 +136,7 @@ class ExactProblem:
         centre, before = complex(starts.mean()), np.inf
         random = np.random.default_rng(0)
         right, left = (random.normal(size=(self.unknowns, len(starts))) + 0j for _ in range(2))
-        for _ in range(ITERATIONS):
+        for _ in range(30):
             s = np.array([centre])
             matrix, slope = self.matrix(s)[0], self.slope(s)[0]
             right = _basis(matrix, slope @ right)
@@ -158,7 +147,8 @@ class ExactProblem:
                 distances = (distances / axis).real * axis
             step = complex(distances.mean())
             centre += step
-            if abs(step) <= CONVERGED * abs(centre) or before <= abs(step) <= SETTLED * abs(centre):
+            # Found where a step is rounding, or is small and shrinks no more.
+            if abs(step) <= 1e-15 * abs(centre) or before <= abs(step) <= 1e-9 * abs(centre):
                 return centre + distances - step, right @ shapes
             before = abs(step)
         raise SimulationError(f"No mode was found next to the rate {starts[0]:.6g} 1/s.")
@@ -191,7 +181,7 @@ def find_exact_modes(
         radius /= 2
     sizes = np.sort(np.abs(starts(WIDER * radius, 0).rates))
     if len(sizes) > enough and sizes[enough] > 0:  # no farther than these few are, which the mesh knows
-        radius = min(radius, ROOM * float(sizes[enough]))
+        radius = min(radius, 1.001 * float(sizes[enough]))
     while True:
         modes = _settled(title, slopes, starts, radius)
         if len(modes) < enough and radius == limit and (wanted is not None or np.isinf(slopes.lines.crowding)):
@@ -204,10 +194,12 @@ def find_exact_modes(
 def _echo_limit(slopes: ExactSlopes) -> float:
     """The rate up to which modes can be named where an end takes all that arrives; infinite where none does."""
     lines = slopes.lines
-    s = np.array([-FADED / float(lines.delay.min())], dtype=complex)
-    if np.isfinite(lines.crowding) or np.linalg.cond(_problem(slopes)[0].matrix(s)[0]) < SINGULAR:
+    # At the rate -40 / T what fades grows to e^40, beyond rounding: the condition is 1e13 then, where nothing echoes.
+    s = np.array([-40.0 / float(lines.delay.min())], dtype=complex)
+    if np.isfinite(lines.crowding) or np.linalg.cond(_problem(slopes)[0].matrix(s)[0]) < 1e13:
         return np.inf
-    return AUDIBLE * np.pi / float(lines.delay.max())
+    # Up to three half waves the count tells an end that takes all from one that throws back some rounding.
+    return 3.0 * np.pi / float(lines.delay.max())
 
 
 def _lowest(modes: Modes, count: int | None) -> Modes:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import reprlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -20,13 +20,6 @@ from shaftwork.results.plotting import new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-DENSE = 48
-"""States up to which many frequencies are solved at once by dense elimination; beyond, one by one and sparse."""
-ROUNDINGS = 64
-"""A natural frequency is hit when it is nearer than so many rounding errors."""
-ASIDE, FARTHEST = 1e-6, 0.1
-"""Where one is hit, the response is read so far to both sides, or farther in a stiff network, by these fractions."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,55 +140,78 @@ def frequency_response(
     if not isinstance(output, str) or output not in slopes.units:
         raise no_quantity(output, title, slopes.units)
     frequencies = frequencies_of(f)
-    response = _Response(slopes, system, slopes.inputs.index(source), output)
+    v = np.zeros((len(slopes.inputs), len(frequencies)), dtype=complex)
+    v[slopes.inputs.index(source)] = 1.0
     unit = slopes.units.get(source, "1")
-    values = response.values(2j * np.pi * frequencies)
+    (values,) = forced_amplitudes(slopes, system, 2j * np.pi * frequencies, v, (output,))
     return FrequencyResponse(title, source, output, (unit, slopes.units[output]), frequencies, values)
 
 
-class _Response:
-    """The amplitude of one quantity under one input."""
+def forced_amplitudes(
+    slopes: Motions, system: DrivenSystem, s: Complex, v: Complex, outputs: Sequence[str]
+) -> list[Complex]:
+    """The complex amplitudes of quantities under inputs that swing as exp(s t), each (k,), along a part (k, places).
 
-    def __init__(self, slopes: Motions, system: DrivenSystem, number: int, output: str) -> None:
-        self._slopes, self._system, self._number, self._output = slopes, system, number, output
+    Infinite where an undamped natural frequency is hit exactly and the quantity takes part in its mode.
+
+    Args:
+        slopes: the network near the point.
+        system: its equations.
+        s: (k,) 1/s, not 0.
+        v: (m, k) amplitudes of all inputs.
+        outputs: names of quantities.
+    """
+    forced = _Forced(slopes, system, tuple(outputs))
+    chunks, hit = list[list[Complex]](), np.zeros(len(s), dtype=bool)
+    for here in blocks(len(s), 4 * len(slopes.weights)):
+        values, hit[here] = forced.read(s[here], v[:, here])
+        chunks.append(values)
+    amplitudes = [np.concatenate(parts) for parts in zip(*chunks, strict=True)]
+    for k in np.flatnonzero(hit).tolist():
+        for amplitude, limit in zip(amplitudes, forced.limits(s[k], v[:, k : k + 1]), strict=True):
+            amplitude[k] = limit
+    return amplitudes
+
+
+class _Forced:
+    """The amplitudes of quantities of a network that is driven."""
+
+    def __init__(self, slopes: Motions, system: DrivenSystem, outputs: tuple[str, ...]) -> None:
+        self._slopes, self._system, self._outputs = slopes, system, outputs
         self._probe = np.random.default_rng(0).normal(size=len(slopes.weights))  # takes part in every mode
 
-    def values(self, s: Complex) -> Complex:
-        """The response (k,), chunk by chunk; where a pole is hit, by its limit."""
-        values, hit = np.empty(len(s), dtype=complex), np.zeros(len(s), dtype=bool)
-        for here in blocks(len(s), 4 * len(self._probe)):
-            values[here], hit[here] = self._read(s[here])
-        for k in np.flatnonzero(hit).tolist():
-            values[k] = self._limit(s[k])
-        return values
-
-    def _read(self, s: Complex) -> tuple[Complex, NDArray[np.bool_]]:
-        """The response (k,), and where an eigenvalue is hit (there it is not to be used)."""
-        right = np.empty((len(s), len(self._probe), 2), dtype=complex)
-        right[:, :, 0], right[:, :, 1] = self._system.driven(s, self._number), self._probe
+    def read(self, s: Complex, v: Complex) -> tuple[list[Complex], NDArray[np.bool_]]:
+        """The amplitudes, and where an eigenvalue is hit (there they are not to be used)."""
+        right = np.zeros((len(s), len(self._probe), 2), dtype=complex)
+        for number in np.flatnonzero(v.any(axis=1)).tolist():
+            right[:, :, 0] += v[number][:, None] * self._system.driven(s, number)
+        right[:, :, 1] = self._probe
         solved = self._system.solved(s, right)
         length = np.linalg.norm(solved[:, :, 1], axis=1)
         hit = ~(length * self._nearness(s) <= np.linalg.norm(self._probe))  # also where it is NaN
         solved[hit] = 0.0
         x = np.asarray(solved[:, :, 0].T / self._slopes.weights[:, None])
-        v = np.zeros((len(self._slopes.inputs), len(s)), dtype=complex)
-        v[self._number] = 1.0
-        return self._slopes.swinging(s, x, v)(self._output), hit
+        read = self._slopes.swinging(s, x, v)
+        return [read(name) for name in self._outputs], hit
 
     def _nearness(self, s: Complex) -> Array:
         """The distance from s within which an eigenvalue is hit, 1/s."""
-        return np.asarray(np.finfo(float).eps * np.maximum(ROUNDINGS * np.abs(s), self._system.size))
+        # 64 rounding errors of s, or those of the matrix
+        return np.asarray(np.finfo(float).eps * np.maximum(64 * np.abs(s), self._system.size))
 
-    def _limit(self, s: complex) -> complex:
-        """The response at a natural frequency: infinite, or finite where input or output does not take part in it.
+    def limits(self, s: complex, v: Complex) -> list[Complex]:
+        """The amplitudes at a natural frequency: infinite, or finite where input or output does not take part in it.
 
         A pole turns its sign there, so the difference of both sides grows towards it, and without one it vanishes.
         """
-        aside = min(max(ASIDE, 1e3 * float(self._nearness(np.array([s]))[0]) / abs(s)), FARTHEST)
-        far_below, below, above, far_above = self._read(s * (1 + aside * np.array([-2.0, -1.0, 1.0, 2.0])))[0]
-        if abs(above - below) > abs(far_above - far_below):
-            return complex(np.inf, 0.0)
-        return complex((above + below) / 2)
+        # so far to both sides, by a fraction of s; farther in a stiff network
+        aside = min(max(1e-6, 1e3 * float(self._nearness(np.array([s]))[0]) / abs(s)), 0.1)
+        steps = np.array([-2.0, -1.0, 1.0, 2.0])
+        sides, _ = self.read(s * (1 + aside * steps), np.repeat(v, len(steps), axis=1))
+        return [
+            np.where(np.abs(above - below) > np.abs(far_above - far_below), complex(np.inf, 0.0), (above + below) / 2)
+            for far_below, below, above, far_above in sides
+        ]
 
 
 class StateEquations:
@@ -214,7 +230,8 @@ class StateEquations:
     def solved(self, s: Complex, right: Complex) -> Complex:
         """Solutions (k, n, 2) of right-hand sides (k, n, 2), NaN where the matrix is singular."""
         size = self._matrix.shape[0]
-        if size <= DENSE:
+        # Dense elimination solves all frequencies at once; of more states one by one, and sparse, is faster.
+        if size <= 48:
             return solved_densely(s[:, None, None] * np.eye(size) - self._matrix.toarray(), right)
         identity = sparse.eye_array(size, format="csc")
         solved = np.empty_like(right, dtype=complex)

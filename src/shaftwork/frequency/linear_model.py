@@ -20,11 +20,6 @@ from shaftwork.frequency.linearization import Linearization
 from shaftwork.frequency.natural_modes import Modes, find_modes
 from shaftwork.results.observer import Array
 
-LARGEST_DENSE = 1000
-"""States up to which A and C are numpy arrays; beyond they are sparse."""
-BLOCK, SPLIT = 256, 16
-"""Groups of states whose effect on the outputs is computed at once, and the parts that one is split into."""
-
 
 @dataclass(frozen=True, eq=False)
 class LinearModel:
@@ -94,13 +89,15 @@ class LinearModel:
         size = len(self.states)
         if self.outputs == self.states:
             return sparse.eye_array(size, format="csr")
+        # Groups of states whose effect on the outputs is computed at once, and the parts that one is split into.
+        block, parts = 256, 16
         weight = np.random.default_rng(0).uniform(1.0, 2.0, size)  # so that two of a group cannot cancel
-        groups = np.array_split(np.arange(size), min(size, BLOCK)) if size else []
+        groups = np.array_split(np.arange(size), min(size, block)) if size else []
         while any(len(group) > 1 for group in groups):
-            reached = [self._of_groups(groups[k : k + BLOCK], weight).any(axis=0) for k in range(0, len(groups), BLOCK)]
+            reached = [self._of_groups(groups[k : k + block], weight).any(axis=0) for k in range(0, len(groups), block)]
             active = [group for group, reaches in zip(groups, np.concatenate(reached), strict=True) if reaches]
-            groups = [part for group in active for part in np.array_split(group, min(len(group), SPLIT))]
-        blocks = [self._of_groups(groups[k : k + BLOCK], np.ones(size)) for k in range(0, len(groups), BLOCK)]
+            groups = [part for group in active for part in np.array_split(group, min(len(group), parts))]
+        blocks = [self._of_groups(groups[k : k + block], np.ones(size)) for k in range(0, len(groups), block)]
         values = np.hstack([np.zeros((len(self.outputs), 0)), *blocks])
         rows, columns = np.nonzero(values)
         places = np.array([group[0] for group in groups], dtype=np.intp)[columns]
@@ -226,4 +223,4 @@ def linear_model(
 
 
 def _plain(matrix: Any) -> Any:
-    return matrix.toarray() if matrix.shape[1] <= LARGEST_DENSE else matrix
+    return matrix.toarray() if matrix.shape[1] <= 1000 else matrix  # 8 MB

@@ -8,6 +8,7 @@ torque winds up springs in series: the derivative of the input then enters the e
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Any
@@ -30,11 +31,6 @@ from shaftwork.formulation.source_inputs import places_of, with_inputs
 from shaftwork.network.graph import GROUND, GraphPart
 from shaftwork.network.kinds import Kind
 from shaftwork.results.observer import Complex
-
-NEARBY = 1e-9
-"""A law is looked at so far to both sides of the point, as a fraction of it, to see whether it jumps there."""
-JUMP = 1e-3
-"""A law jumps where its two values differ by more than this fraction of them, its slope taken into account."""
 
 
 def refuse_waves(form: StateForm) -> None:
@@ -76,7 +72,7 @@ class Linearization:
         places = places_of(model.form.graph, inputs)
         form, branches = with_inputs(model.form, places)
         x = x if arriving is None else np.concatenate([x, arriving])
-        self._form, self._point = form, (t, x)
+        self._form = form
         self._bound = model.bind(p) if form is model.form else ArrayProgram(form).bind(p)
         if self._bound.loops is not None and (solved := model.bind(p).loops) is not None:
             self._bound.loops.start_from(solved.solve(t, x))  # the same of several solutions
@@ -91,14 +87,35 @@ class Linearization:
             (rows, range(len(rows))),
         )
         self._enter = sparse.csr_array(entries, shape=(len(order), len(rows)))
+        self.B1: Array = (part.B1 @ self._enter).toarray()
+        self.weights = _energy_weights(self._bound)
+        self._take_slopes(t, x)
+
+    def _take_slopes(self, t: float, x: Array) -> None:
+        """The matrices that follow from the slopes of the laws at a point."""
+        part, form = self._bound.part, self._form
+        self._point = (t, x)
         self._by_state, self._by_input = _input_slopes(self._bound, t, x, self._enter)
         self.A = sparse.csr_array(part.A + part.B @ self._by_state)
         self.B = (part.B @ self._by_input).toarray()
-        self.B1: Array = (part.B1 @ self._enter).toarray()
         ends = [form.outputs.index(branch) for branch in form.waves]
         self.C = sparse.csr_array(part.C[ends] + part.D[ends] @ self._by_state)
         self.D = (part.D[ends] @ self._by_input).toarray()
-        self.weights = _energy_weights(self._bound)
+
+    def moved(self, x: Array, t: float) -> Linearization:
+        """The same network and inputs near another point, without assembling anew.
+
+        Args:
+            x: (n,) states there.
+            t: time at which laws are read, s.
+
+        Raises:
+            SimulationError: a law has no finite slope there.
+        """
+        other = copy.copy(self)
+        vars(other).pop("_nominal", None)
+        other._take_slopes(t, x)  # noqa: SLF001 (of its own class)
+        return other
 
     @cached_property
     def _names(self) -> _Reader:
@@ -231,12 +248,14 @@ def _refuse_jumps(bound: BoundArrays, t: float, y: Array, x: Array) -> None:
     switching = np.array([jumps(template.law, ACROSS, INTEGRAL, *template.reads) for template in templates], dtype=bool)
     if not switching.any():
         return
-    step_y, step_x = (NEARBY * np.maximum(np.abs(values), 1.0) for values in (y, x))
+    # A law is read so near to the point, on both sides of it. It jumps where its two values differ by more than a
+    # thousandth of them, its slope taken into account.
+    step_y, step_x = (1e-9 * np.maximum(np.abs(values), 1.0) for values in (y, x))
     above, below = (inputs.values(t, y + side * step_y, x + side * step_x, p) for side in (1.0, -1.0))
     by_y, by_x = inputs.slopes(t, y, x, p)
     expected = 2 * (by_y @ step_y + by_x @ step_x[: inputs.states])
     gap = np.abs(above - below - expected)
-    if (bad := np.flatnonzero(switching & (gap > JUMP * np.maximum(np.abs(above), np.abs(below))))).size:
+    if (bad := np.flatnonzero(switching & (gap > 1e-3 * np.maximum(np.abs(above), np.abs(below))))).size:
         raise SimulationError(f"{_laws_of(bound, bad)} a jump at this point and so no slope. {_elsewhere(t)}")
 
 

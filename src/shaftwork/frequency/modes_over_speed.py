@@ -12,10 +12,6 @@ from scipy.optimize import brentq, linear_sum_assignment
 from shaftwork.frequency.natural_modes import EQUAL, Modes, natural_frequencies
 from shaftwork.results.observer import Array, Complex
 
-REFINED = 1e-12
-"""To this fraction a speed is found that is sought."""
-HALVINGS, NARROW = 40, 1e-6
-"""An interval in which the phase changes is halved so often at most, and down to this fraction of its width."""
 BEYOND = 1.2
 """Modes are followed up to so many times the end of a diagram, so that none is lost at its edge."""
 BETWEEN = ", "
@@ -129,7 +125,8 @@ class OverSpeed:
     def _between(self, first: Swinging, last: Swinging, orders: Sequence[float]) -> list[Meeting]:
         """Those of an interval. Where the phase changes within it, it is halved until its parts have one phase each."""
         waiting, meetings = [(first, last)], list[Meeting]()
-        halvings, narrow = HALVINGS, NARROW * (last.speed - first.speed)
+        # an interval in which the phase changes is halved so often at most, and down to this part of the whole
+        halvings, narrow = 40, 1e-6 * (last.speed - first.speed)
         while waiting:
             left, right = waiting.pop(0)
             alike, is_wide = self._alike(left, right), right.speed - left.speed > narrow
@@ -184,7 +181,7 @@ class OverSpeed:
             at = self.at(speed)
             return float(at.above(order)[rank]) if _goes_on(left, at, rank) else 0.0  # which ends the search
 
-        return self.at(brentq(gap, left.speed, right.speed, xtol=np.finfo(float).tiny, rtol=REFINED, disp=False))
+        return self.at(brentq(gap, left.speed, right.speed, xtol=np.finfo(float).tiny, rtol=1e-12, disp=False))
 
 
 def _at(point: Swinging, orders: Iterable[float]) -> list[Meeting]:

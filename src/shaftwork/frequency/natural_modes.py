@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from shaftwork.core.errors import ParameterError, no_quantity
+from shaftwork.core.notebook import html_table
 from shaftwork.core.parameters import in_si, whole
 from shaftwork.core.screen import counted
 from shaftwork.frequency.eigenvalues import eigenmodes
@@ -23,13 +24,13 @@ from shaftwork.results.plotting import new_figure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from shaftwork.animation.animation import Animation
+
 EQUAL = 1e-6
 """Amplitudes, rates and frequencies that differ by less than this fraction are equal: of several largest amplitudes the
 first is the reference of the shape."""
 MOVES = 1e-9
 """A node moves when its amplitude, or speed, is more than this fraction of the largest."""
-SHOWN, LABELS = 6, 20
-"""Modes in a picture when nobody says which, and the most nodes that are named under it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +95,41 @@ class Modes:
             lines.append(f"{name:<{width}}  {frequency:>12.6g}  {damping:>z10.4g}  {shown:>26}  {node}")
         return "\n".join([f"{self.title}: {counted(len(self), 'mode')}", *lines])
 
+    def _repr_html_(self) -> str:
+        rows = [
+            [name, f"{f:.6g}", f"{60 * f:.6g}", f"{damping:z.4g}", node] for name, f, damping, _, node in self.table
+        ]
+        return html_table(
+            f"{self.title}: {counted(len(self), 'mode')}", ("mode", "Hz", "1/min", "damping", "moves most"), rows
+        )
+
+    def animate(self, number: int, seconds: float = 4.0) -> Animation:
+        """A mode as a moving picture, its discs at the nodes that rotate, as many swings as fit (extra `plot`).
+
+        Args:
+            number: row of the table, from 0.
+            seconds: how long it is shown.
+
+        Raises:
+            ParameterError: there is no such mode, or nothing rotates.
+            MissingExtraError: matplotlib is not installed.
+        """
+        from shaftwork.animation.animation import swinging
+
+        self._refuse_unknown((number,))
+        shapes = {
+            name.rpartition(".")[0]: complex(self.shapes[name][number])
+            for name, (unit, _) in self.slopes.nodes.items()
+            if unit == "rad/s" and "." not in name.rpartition(".")[0]
+        }
+        frequency = self.frequencies[number]
+        title = f"{self.title}, {self.names[number]}: {frequency:.6g} Hz, damping {self.damping[number]:.3g}"
+        return swinging(title, shapes, seconds)
+
+    def _refuse_unknown(self, numbers: tuple[int, ...]) -> None:
+        if wrong := [number for number in numbers if number not in range(len(self))]:
+            raise ParameterError(f"There is no mode {wrong[0]}: '{self.title}' has {len(self)}, counted from 0.")
+
     def plot(self, *numbers: int) -> Figure:
         """The speeds of the nodes in each mode, in the order of the network (extra `plot`).
 
@@ -104,10 +140,10 @@ class Modes:
             ParameterError: there is no such mode.
             MissingExtraError: matplotlib is not installed.
         """
-        if wrong := [number for number in numbers if number not in range(len(self))]:
-            raise ParameterError(f"There is no mode {wrong[0]}: '{self.title}' has {len(self)}, counted from 0.")
-        swinging = np.flatnonzero(self.rates.imag > 0)[:SHOWN].tolist()
-        return _plot(self, numbers or tuple(swinging) or tuple(range(min(SHOWN, len(self)))))
+        self._refuse_unknown(numbers)
+        most = 6  # modes where nobody says which
+        swinging = np.flatnonzero(self.rates.imag > 0)[:most].tolist()
+        return _plot(self, numbers or tuple(swinging) or tuple(range(min(most, len(self)))))
 
 
 class _Shapes(Mapping[str, Complex]):
@@ -287,7 +323,7 @@ def _plot(modes: Modes, numbers: tuple[int, ...]) -> Figure:
         fullest[0].axes.legend(loc="best", frameon=False, fontsize=8)
     named = [(place, name.rpartition(".")[0]) for name, (_, place) in nodes.items()]
     named = [(place, name) for place, name in named if "." not in name]  # those inside a part speak for themselves
-    shown = named[:: max(1, -(-len(named) // LABELS))]
+    shown = named[:: max(1, -(-len(named) // 20))]  # names of more nodes would overlap
     axes[-1].set_xticks([place for place, _ in shown], [name for _, name in shown], rotation=45)
     return figure
 

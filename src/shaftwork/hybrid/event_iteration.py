@@ -11,6 +11,7 @@ from types import MappingProxyType
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.hybrid.commutation import Commutation
+from shaftwork.hybrid.equation_sets import EquationSets
 from shaftwork.hybrid.hybrid_state import (
     Change,
     HybridState,
@@ -20,10 +21,10 @@ from shaftwork.hybrid.hybrid_state import (
     passes_limit,
     resting,
 )
+from shaftwork.hybrid.hybrid_transfer import HybridTransfer, mode_anew, refuse_beyond
 from shaftwork.hybrid.impacts.impacts import Impacts
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import ActiveGuard, ModeNames, limited, with_modes
-from shaftwork.hybrid.phases import Phases, Regimes, anew, refuse_beyond
 
 MOST_AT_ONCE = 2000
 """So many changes within one instant have no end: of two rigid flanks without a gap between them, say."""
@@ -34,7 +35,7 @@ class EventIteration:
     """Changes modes at an instant.
 
     Args:
-        phases: the sets of equations.
+        equation_sets: the sets of equations.
         values: parameters that differ from the network's.
         span: start and end of the run, s.
         equations: for a combination of modes; by default each has its own, as an analysis reads them.
@@ -42,100 +43,100 @@ class EventIteration:
 
     def __init__(
         self,
-        phases: Phases,
+        equation_sets: EquationSets,
         values: Mapping[str, float],
         span: tuple[float, float],
         equations: Callable[[ModeNames], ModeEquations] | None = None,
     ) -> None:
-        self.elements = phases.elements
-        self._regimes = Regimes(phases, values, span, equations or phases.assembly)
-        self.regime, self.resumed = self._regimes.regime, self._regimes.resumed
-        self._impacts = Impacts(self._regimes, together=phases.netlist.impacts == "together")
-        self._commutation = Commutation(self._regimes)
-        self.jumped, self.possible = self._impacts.jumped, self._regimes.possible
+        self.machines = equation_sets.machines
+        self._transfer = HybridTransfer(equation_sets, values, span, equations or equation_sets.of)
+        self.regime, self.resumed = self._transfer.regime, self._transfer.resumed
+        self._impacts = Impacts(self._transfer, together=equation_sets.netlist.impacts == "together")
+        self._commutation = Commutation(self._transfer)
+        self.jumped, self.possible = self._impacts.jumped, self._transfer.possible
 
-    def started(self, t: float, x: Array, joins: Mapping[int, str] = MappingProxyType({})) -> HybridState:
+    def in_start_modes(self, t: float, x: Array, joins: Mapping[int, str] = MappingProxyType({})) -> HybridState:
         """The modes in which a motion starts, from the states of the equations in which no mode joins anything.
 
-        An element that nothing else lets start in its mode, as a friction that a prescribed speed is about to turn,
+        A machine that nothing else lets start in its mode, as a friction that a prescribed speed is about to turn,
         starts in one to which that mode leads.
 
         Args:
             t: time in s at which inputs are read.
             x: (n,) states.
-            joins: elements that do join something in these equations, and the modes in which they do.
+            joins: machines that do join something in these equations, and the modes in which they do.
 
         Raises:
             ParameterError: a twist lies beyond a rigid limit.
         """
-        loose = HybridState(self.regime(with_modes(self._regimes.first, joins)), x)
+        loose = HybridState(self.regime(with_modes(self._transfer.first, joins)), x)
         refuse_beyond(loose, t)
         regime, modes = loose.regime, loose.regime.modes
-        wanted = with_modes(regime.assembly.first_modes(t, x, regime.p), joins)
+        wanted = with_modes(regime.equations.first_modes(t, x, regime.p), joins)
         if self.possible(wanted):
-            return self._regimes.changed(loose, t, wanted)
+            return self._transfer.to_modes(loose, t, wanted)
         # of switches the time tells, so that others give way
-        for k in sorted(range(len(wanted)), key=lambda k: not self.elements[k].is_switch):
-            leaves = (leave for leave in self.elements[k].modes[wanted[k]].leaves if not leave.by_time)
+        for k in sorted(range(len(wanted)), key=lambda k: not self.machines[k].is_switch):
+            leaves = (leave for leave in self.machines[k].modes[wanted[k]].leaves if not leave.by_time)
             names = (wanted[k], *(leave.to for leave in leaves if leave.to))
             options = (with_modes(modes, {k: name}) for name in names)
             modes = next(filter(self.possible, options), modes)
-        return self._regimes.changed(loose, t, modes)
+        return self._transfer.to_modes(loose, t, modes)
 
-    def begun(self, t: float, x: Array) -> HybridState:
-        """The modes that go on where a motion starts at a time in s with states (n,), as in `started`."""
-        return self.settle(t, t, self.started(t, x), None)[0]
+    def started(self, t: float, x: Array) -> HybridState:
+        """The modes that go on where a motion starts at a time in s with states (n,), as in `in_start_modes`."""
+        return self.run(t, t, self.in_start_modes(t, x), None)[0]
 
-    def settle(self, t: float, after: float, moment: HybridState, met: int | None) -> Transition:
+    def run(self, t: float, after: float, state: HybridState, met: int | None) -> Transition:
         """The modes that go on, and the changes that lead there.
 
         Args:
             t: the instant, s.
             after: a time just after it, s, at which inputs are read.
-            moment: what was before.
+            state: what was before.
             met: the guard that ended the phase, or None.
 
         Raises:
             SimulationError: no modes are consistent; names the pair that changes for ever.
         """
-        ends = met is not None or passes_limit(moment._replace(bands=()), after)
-        joins = resting(moment, after) if ends else {}
+        ends = met is not None or passes_limit(state._replace(bands=()), after)
+        joins = resting(state, after) if ends else {}
         if not joins:
-            return self._fewest(t, after, moment, met)
+            return self._fewest(t, after, state, met)
         # Who carries is told anew. A law that falls at once would tell a way in which nothing moves: of two frictions
         # one has given way at rest, and now the other one does, backward. Once it moves, the first one has less torque
         # than it holds at rest, and would move forward instead, which the other one does not let it.
-        joined, begun = self._joined(t, after, moment, joins)
+        joined, begun = self._joined(t, after, state, joins)
         new, changes = self._consistent(t, after, joined, None)
-        if new.regime.modes == moment.regime.modes:  # rounding hides what was met
-            ended = [(active.element, active.leave) for active in moment.regime.watched if active.guard == met]
-            same = (active.guard for active in joined.regime.watched if (active.element, active.leave) in ended)
+        if new.regime.modes == state.regime.modes:  # rounding hides what was met
+            ended = [(active.machine, active.leave) for active in state.regime.watched if active.guard == met]
+            same = (active.guard for active in joined.regime.watched if (active.machine, active.leave) in ended)
             new, changes = self._fewest(t, after, joined, next(same, None))
         return new, _together([*begun, *changes])
 
-    def _joined(self, t: float, after: float, moment: HybridState, joins: Mapping[int, str]) -> Transition:
-        """The same instant with elements in modes in which they hold, and the changes to these."""
-        modes, joinable = moment.regime.modes, self._regimes.joinable(moment.regime.modes, joins)
-        changes = [Change(t, self.elements[k], modes[k], name) for k, name in joinable.items()]
-        return self._regimes.changed(moment, after, with_modes(modes, joinable)), changes
+    def _joined(self, t: float, after: float, state: HybridState, joins: Mapping[int, str]) -> Transition:
+        """The same instant with machines in modes in which they hold, and the changes to these."""
+        modes, joinable = state.regime.modes, self._transfer.joinable(state.regime.modes, joins)
+        changes = [Change(t, self.machines[k], modes[k], name) for k, name in joinable.items()]
+        return self._transfer.to_modes(state, after, with_modes(modes, joinable)), changes
 
-    def _fewest(self, t: float, after: float, moment: HybridState, met: int | None) -> Transition:
+    def _fewest(self, t: float, after: float, state: HybridState, met: int | None) -> Transition:
         """Of several guards that are met at one instant, rounding tells which of them ends the phase.
 
         So each is followed first, and the fewest changes are taken: two flanks that one torque has pressed together
         part where they have to, and not at both.
         """
         if met is None:
-            return self._consistent(t, after, moment, None)
-        named = next(active for active in moment.regime.watched if active.guard == met)
+            return self._consistent(t, after, state, None)
+        named = next(active for active in state.regime.watched if active.guard == met)
         transitions: list[Transition] = []
         failed: list[SimulationError] = []
-        met_at_once = self._at_once(moment, after, named)
+        met_at_once = self._at_once(state, after, named)
         # an angle waits for nothing
-        least = max(1, len({active.element for active in met_at_once if active.leave.by_twist}))
+        least = max(1, len({active.machine for active in met_at_once if active.leave.by_twist}))
         for first in met_at_once:
             try:
-                transitions.append(self._consistent(t, after, moment, first))
+                transitions.append(self._consistent(t, after, state, first))
             except SimulationError as error:
                 failed.append(error)
             else:
@@ -146,18 +147,18 @@ class EventIteration:
             raise failed[0]
         return min(transitions, key=lambda transition: len(transition[1]))
 
-    def _at_once(self, moment: HybridState, t: float, named: ActiveGuard) -> list[ActiveGuard]:
-        """The guards that are met at the instant at which one is, in the order of their elements."""
-        met = [active for _, active in exceeded(moment, t, moment, in_order=True)[1]]
+    def _at_once(self, state: HybridState, t: float, named: ActiveGuard) -> list[ActiveGuard]:
+        """The guards that are met at the instant at which one is, in the order of their machines."""
+        met = [active for _, active in exceeded(state, t, state, in_order=True)[1]]
         if named not in met and (not named.leave.by_torque or all(active.leave.by_torque for active in met)):
             met.append(named)
-        return sorted(met, key=moment.regime.watched.index)
+        return sorted(met, key=state.regime.watched.index)
 
-    def _consistent(self, t: float, after: float, moment: HybridState, first: ActiveGuard | None) -> Transition:
-        """Modes that are consistent with the motion that follows, by one change after another; see `settle`.
+    def _consistent(self, t: float, after: float, state: HybridState, first: ActiveGuard | None) -> Transition:
+        """Modes that are consistent with the motion that follows, by one change after another; see `run`.
 
         Args:
-            t, after, moment: as there.
+            t, after, state: as there.
             first: the guard to begin with, or None.
         """
         changes: list[Change] = []
@@ -166,13 +167,13 @@ class EventIteration:
         blocked, repeats, late = None, 0, 0.0
         tried: Counter[tuple[ModeNames, int]] = Counter()  # other modes than what contradicts, each of them once
         # a guard is met where it is beyond zero by its band, which then still is the band of what is the same after it
-        ended = moment
+        ended = state
         worst = first
         if worst is None:
-            moment, worst = _worst(moment, after, ended, idle, repeats)
+            state, worst = _worst(state, after, ended, idle, repeats)
         while worst is not None:
-            here = moment.regime.modes, worst.element
-            moment, latest, contradiction, since = self._follow(t, after, moment, worst, tried[here])
+            here = state.regime.modes, worst.machine
+            state, latest, contradiction, since = self._follow(t, after, state, worst, tried[here])
             late += since
             changes, blocked = [*changes, *latest], contradiction or blocked
             if contradiction is not None:
@@ -180,7 +181,7 @@ class EventIteration:
                 if tried[here] > 1:
                     seen.clear()
             impact = bool(latest) and latest[0].impact
-            again = bool(latest) and not impact and moment.regime.modes in seen
+            again = bool(latest) and not impact and state.regime.modes in seen
             repeats += again
             if repeats > MOST_REPEATS or len(changes) > MOST_AT_ONCE:
                 raise _endless(t, changes, blocked)
@@ -189,116 +190,116 @@ class EventIteration:
             if impact:
                 tried.clear()  # what contradicted others need not do so at other speeds
             idle = [] if latest else [*idle, worst]
-            seen[moment.regime.modes] = None
-            moment, worst = _worst(moment, after, ended, idle, repeats)
+            seen[state.regime.modes] = None
+            state, worst = _worst(state, after, ended, idle, repeats)
             if worst is None and late:  # in the modes that go on, how long ago it was hit
-                moment, worst = _worst(moment.moved(after, late), after, ended, idle, repeats)
+                state, worst = _worst(state.moved(after, late), after, ended, idle, repeats)
                 late = 0.0
-        return moment, changes
+        return state, changes
 
     def _follow(
-        self, t: float, after: float, moment: HybridState, ended: ActiveGuard, tried: int
+        self, t: float, after: float, state: HybridState, ended: ActiveGuard, tried: int
     ) -> tuple[HybridState, list[Change], NetworkError | None, float]:
-        """The mode of an element changes, or what hits is thrown back; what kept it from what it wanted, and how long
+        """The mode of a machine changes, or what hits is thrown back; what kept it from what it wanted, and how long
         ago, in s, it was hit. Of the other modes instead of what contradicts, some have been tried.
         """
-        number, leave, regime = ended.element, ended.leave, moment.regime
-        element = self.elements[number]
+        number, leave, regime = ended.machine, ended.leave, state.regime
+        machine = self.machines[number]
         before = regime.modes[number]
-        to = leave.to or anew(moment, after, number)
-        if element.is_switch and (switched := self._commutation.switched(t, after, moment, number, to)):
+        to = leave.to or mode_anew(state, after, number)
+        if machine.is_switch and (switched := self._commutation.switched(t, after, state, number, to)):
             return *switched, None, 0.0
-        speed = self._impacts.meets(moment, after, element.modes[to], number)
-        slips = next((name for side, name in element.modes[to].gives_way if side * speed > 0), "")
+        speed = self._impacts.meets(state, after, machine.modes[to], number)
+        slips = next((name for side, name in machine.modes[to].gives_way if side * speed > 0), "")
         if slips == before:  # it was met by rounding alone: it is moving away
-            return moment, [], None, 0.0
+            return state, [], None, 0.0
         if slips:  # its torque is limited, so it takes no speed away at once
             to, speed = slips, 0.0
         try:
             if speed or (leave.rebound is not None and not slips):
-                hit = self._impacts.hit(t, after, moment, replace(ended, leave=replace(leave, to=to)))
+                hit = self._impacts.hit(t, after, state, replace(ended, leave=replace(leave, to=to)))
                 return *hit[:2], None, hit[2]
             modes = with_modes(regime.modes, {number: to})
-            new, conducting = self._commutation.commutated(moment, after, modes)
-            others = [Change(t, self.elements[k], regime.modes[k], name) for k, name in conducting.items()]
-            return new, [Change(t, element, before, to), *others], None, 0.0
+            new, conducting = self._commutation.commutated(state, after, modes)
+            others = [Change(t, self.machines[k], regime.modes[k], name) for k, name in conducting.items()]
+            return new, [Change(t, machine, before, to), *others], None, 0.0
         except NetworkError as error:
-            return *self._instead(t, after, moment, (number, to), error, tried), error, 0.0
+            return *self._instead(t, after, state, (number, to), error, tried), error, 0.0
 
     def _instead(
-        self, t: float, after: float, moment: HybridState, wanted: tuple[int, str], error: NetworkError, tried: int
+        self, t: float, after: float, state: HybridState, wanted: tuple[int, str], error: NetworkError, tried: int
     ) -> Transition:
         """Past a mode whose equations contradict others: into one to which it leads, or something else gives way.
 
         A friction that a prescribed speed turns cannot stick: it passes from slipping one way to slipping the other.
         """
-        modes, (number, to) = moment.regime.modes, wanted
-        element, before = self.elements[number], modes[number]
+        modes, (number, to) = state.regime.modes, wanted
+        machine, before = self.machines[number], modes[number]
         gears = self._impacts.gears
-        if number in gears and (other := self._passing_on(after, moment, number, to)) is not None:
-            return other[0], [Change(t, element, before, other[1])]
-        leads = (leave for leave in element.modes[to].leaves if leave.to not in ("", before))
+        if number in gears and (other := self._passing_on(after, state, number, to)) is not None:
+            return other[0], [Change(t, machine, before, other[1])]
+        leads = (leave for leave in machine.modes[to].leaves if leave.to not in ("", before))
         # neither the other flank nor a time to come is there
         leads_on = [{number: leave.to} for leave in leads if leave.rebound is None and not leave.by_twist]
-        sides = limited(self.elements, modes).items()
+        sides = limited(self.machines, modes).items()
         yields = [{number: to, k: name} for k, gives_way in sides for _, name in gives_way if k != number]
         # a gear jams only where nothing beside it gives way
         options = [*yields, *leads_on] if number in gears else [*leads_on, *yields]
         for k in gears:
-            options += [{number: to, k: leave.to} for leave in self.elements[k].modes[modes[k]].leaves if k != number]
+            options += [{number: to, k: leave.to} for leave in self.machines[k].modes[modes[k]].leaves if k != number]
         combinations = filter(self.possible, (with_modes(modes, option) for option in options))
         for combination in islice(combinations, tried, None):
             try:
-                new = self._impacts.jammed(after, moment, self._regimes.changed(moment, after, combination))
+                new = self._impacts.jammed(after, state, self._transfer.to_modes(state, after, combination))
             except NetworkError:  # what slips behind the gear lets another one jam
                 continue
-            return new, differences(t, self.elements, modes, new.regime.modes)
+            return new, differences(t, self.machines, modes, new.regime.modes)
         raise SimulationError(
-            f"'{element.name}' can neither stay {element.modes[before].words} nor become {element.modes[to].words} "
+            f"'{machine.name}' can neither stay {machine.modes[before].words} nor become {machine.modes[to].words} "
             f"at t = {t:.9g} s. {error.problems[0]}"
         ) from error
 
-    def _passing_on(self, t: float, moment: HybridState, number: int, to: str) -> tuple[HybridState, str] | None:
+    def _passing_on(self, t: float, state: HybridState, number: int, to: str) -> tuple[HybridState, str] | None:
         """Another mode of a gear at rest, and what follows, that contradicts nothing and leaves all else as it is."""
-        modes, options = moment.regime.modes, self.elements[number].modes
-        if moment.across(number, t) != 0:
+        modes, options = state.regime.modes, self.machines[number].modes
+        if state.across(number, t) != 0:
             return None
-        stored = moment.stored(t)
+        stored = state.stored(t)
         leads = [leave.to for name in (to, modes[number]) for leave in options[name].leaves]
         for name in dict.fromkeys(leads):
             combination = with_modes(modes, {number: name})
             if name in (to, modes[number]) or not self.possible(combination):
                 continue
-            new = self._regimes.changed(moment, t, combination)
+            new = self._transfer.to_modes(state, t, combination)
             if new.stored(t) == stored and not exceeded(new, t, new)[1]:
                 return new, name
         return None
 
 
 def _worst(
-    moment: HybridState, t: float, ended: HybridState, idle: Sequence[ActiveGuard], repeats: int
+    state: HybridState, t: float, ended: HybridState, idle: Sequence[ActiveGuard], repeats: int
 ) -> tuple[HybridState, ActiveGuard | None]:
-    """The guard that is farthest beyond its limit, or on it and about to go beyond; the moment with its bands.
+    """The guard that is farthest beyond its limit, or on it and about to go beyond; the hybrid state with its bands.
 
     Args:
-        moment, t, ended, idle: as in `exceeded`.
+        state, t, ended, idle: as in `exceeded`.
         repeats: how often modes have come back. After the first time the first guard is taken. The worst leads faster
             to modes that are consistent, as a rule; but this always does where parts hold each other (Murty, Linear
             Complementarity, 1988, section 4.1).
     """
     in_order = repeats > 0
-    moment, excesses = exceeded(moment, t, ended, idle, in_order=in_order, again=in_order)
+    state, excesses = exceeded(state, t, ended, idle, in_order=in_order, again=in_order)
     if not excesses:
-        return moment, None
-    first = min(excesses, key=lambda one: one[1].element) if in_order else max(excesses, key=lambda one: one[0])
-    return moment, first[1]
+        return state, None
+    first = min(excesses, key=lambda one: one[1].machine) if in_order else max(excesses, key=lambda one: one[0])
+    return state, first[1]
 
 
 def _endless(t: float, changes: list[Change], blocked: NetworkError | None) -> SimulationError:
     """The error of changes within one instant that come to no end, or of what contradicts what among them."""
     last = changes[-1]
-    others = dict.fromkeys(change.element.name for change in changes)
-    before, after = (last.element.modes[name].words for name in (last.before, last.after))
+    others = dict.fromkeys(change.machine.name for change in changes)
+    before, after = (last.machine.modes[name].words for name in (last.before, last.after))
     if blocked is not None:
         advice = str(blocked.problems[0])
     elif last.rebound:
@@ -306,17 +307,17 @@ def _endless(t: float, changes: list[Change], blocked: NetworkError | None) -> S
     else:
         advice = "Give the node between them an inertia or damping."
     return SimulationError(
-        f"At t = {t:.9g} s no modes of {', '.join(others)} are consistent: '{last.element.name}' changes for ever "
+        f"At t = {t:.9g} s no modes of {', '.join(others)} are consistent: '{last.machine.name}' changes for ever "
         f"between {before} and {after}. {advice}"
     )
 
 
 def _together(changes: list[Change]) -> list[Change]:
-    """Changes of one instant, with those of each element in one; but an impact stays apart."""
+    """Changes of one instant, with those of each machine in one; but an impact stays apart."""
     if any(change.impact for change in changes):
         return changes
-    by_element: dict[int, Change] = {}
+    by_machine: dict[int, Change] = {}
     for change in changes:
-        earlier = by_element.get(id(change.element), change)
-        by_element[id(change.element)] = change._replace(before=earlier.before)
-    return [change for change in by_element.values() if change.before != change.after]
+        earlier = by_machine.get(id(change.machine), change)
+        by_machine[id(change.machine)] = change._replace(before=earlier.before)
+    return [change for change in by_machine.values() if change.before != change.after]

@@ -23,17 +23,17 @@ from shaftwork.codegen.undefined_laws import refuse_vanishing
 from shaftwork.core.errors import AccuracyWarning, NetworkError, ParameterError, SimulationError
 from shaftwork.core.notices import warn
 from shaftwork.hybrid.commutation import takeovers
+from shaftwork.hybrid.equation_sets import FOLLOWING, EquationSets
 from shaftwork.hybrid.event_iteration import EventIteration
 from shaftwork.hybrid.hybrid_state import Change, HybridState, Regime, Transition
 from shaftwork.hybrid.in_place_events import InPlaceEvents, Phase
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, with_modes
-from shaftwork.hybrid.phases import FOLLOWING, Phases
-from shaftwork.hybrid.starts import refuse_incomplete, warn_of_what_may_have_begun
+from shaftwork.hybrid.modes.starts import refuse_incomplete, warn_of_what_may_have_begun
 from shaftwork.integrate import choice
-from shaftwork.integrate.problem import Problem, SeriesError, StickingError, Trajectory, changed
+from shaftwork.integrate.problem import Problem, SeriesError, Trajectory, changed
 from shaftwork.pipeline.arguments import Demand
-from shaftwork.pipeline.implicit import PRESCRIBED, at_rest
+from shaftwork.pipeline.implicit import PRESCRIBED, without_states
 from shaftwork.pipeline.motion_start import Ending
 
 if TYPE_CHECKING:
@@ -64,12 +64,12 @@ class SharedByRuns:
     """What runs with the same values over the same time share.
 
     Args:
-        settling: changes modes.
+        event_iteration: changes modes.
         timelines: by equations, the instants at which inputs jump or bend.
         begins: modes and states with which a motion from rest begins, and the changes that lead there.
     """
 
-    settling: EventIteration
+    event_iteration: EventIteration
     timelines: dict[ModeEquations, Timeline] = field(default_factory=dict)
     begins: list[Transition] = field(default_factory=list)
 
@@ -78,54 +78,55 @@ class HybridRun:
     """One motion through its phases.
 
     Args:
-        phases: the sets of equations.
+        equation_sets: the sets of equations.
         values: parameters that differ from the network's.
         demand: what is asked.
         by_combination: whether each combination of modes has equations of its own.
     """
 
     def __init__(
-        self, phases: Phases, values: Mapping[str, float], demand: Demand, *, by_combination: bool = False
+        self, equation_sets: EquationSets, values: Mapping[str, float], demand: Demand, *, by_combination: bool = False
     ) -> None:
-        self.phases, self.demand = phases, demand
-        equations = None if by_combination else partial(phases.running, values=values, engine=demand.engine)
+        self.equation_sets, self.demand = equation_sets, demand
+        equations = None if by_combination else partial(equation_sets.running, values=values, engine=demand.engine)
         key = tuple(sorted(values.items())), demand.span, by_combination, demand.engine
-        self._shared: SharedByRuns = phases.last_run(
-            key, lambda: SharedByRuns(EventIteration(phases, values, demand.span, equations))
+        self._shared: SharedByRuns = equation_sets.last_run(
+            key, lambda: SharedByRuns(EventIteration(equation_sets, values, demand.span, equations))
         )
-        self.settling: EventIteration = self._shared.settling
+        self.event_iteration: EventIteration = self._shared.event_iteration
         self.spans: list[Span] = []
         self.changes: list[Change] = []
         self.jumps: list[Impact] = []
         self.engine, self.why, self.steps = "", "", 0
         self.waves: WaveRun | None = None
         self._soon = [0] * len(CHATTER)
+        self._duration = demand.span[1] - demand.span[0]
 
     def march(self, initial: Mapping[str, float] | None) -> None:
         """Go through all phases from the start values, from one change of equations to the next."""
         t, end = self.demand.span
-        moment = self.begin(initial)
+        state = self.begin(initial)
         while t < end:
-            t, moment = self._span(t, moment)
+            t, state = self._span(t, state)
 
     def begin(self, initial: Mapping[str, float] | None) -> HybridState:
         """The states and modes at the start."""
         start, begins = self.demand.span[0], self._shared.begins
-        if self.settling.regime(self.phases.first).assembly.model.form.waves:
+        if self.event_iteration.regime(self.equation_sets.first).equations.model.form.waves:
             begins = []  # what leaves the ends before the start is of the run
         if isinstance(initial, Ending):
-            moment, changes = self._resumed(initial)
+            state, changes = self._resumed(initial)
         elif initial is None and begins:
-            moment, changes = begins[0]
+            state, changes = begins[0]
         else:
-            moment, changes = self._started(initial)
+            state, changes = self._started(initial)
             if initial is None:
-                begins.append((moment, changes))
+                begins.append((state, changes))
         if initial and start != 0 and not isinstance(initial, Ending):
-            for element, mode in zip(self.phases.elements, moment.regime.modes, strict=True):
-                warn_of_what_may_have_begun(element.name, element.modes, mode, start)
+            for machine, mode in zip(self.equation_sets.machines, state.regime.modes, strict=True):
+                warn_of_what_may_have_begun(machine.name, machine.modes, mode, start)
         self.note(start, changes)
-        return moment
+        return state
 
     def _started(self, initial: Mapping[str, float] | None) -> Transition:
         """The states and modes at the start, and what changes there; currents may need diodes that conduct."""
@@ -135,16 +136,16 @@ class HybridRun:
         start, closed = self.demand.span[0], self._closed()
         for joins in [{}, closed] if closed else [{}]:
             try:
-                moment = self._read(initial, joins)
+                state = self._read(initial, joins)
             except ParameterError as error:
                 failed = failed or error
             else:
-                stored = moment.stored(start)
-                readings.append((sum(stored[name] != 0 for name in stored.keys() - initial.keys()), joins, moment))
+                stored = state.stored(start)
+                readings.append((sum(stored[name] != 0 for name in stored.keys() - initial.keys()), joins, state))
         if readings:  # what is not named rests, if the circuit lets it
-            _, joins, moment = min(readings, key=itemgetter(0))
-            return self._joined(joins, moment)
-        for joins in takeovers(self.phases.elements, with_modes(self.phases.first, closed)):
+            _, joins, state = min(readings, key=itemgetter(0))
+            return self._joined(joins, state)
+        for joins in takeovers(self.equation_sets.machines, with_modes(self.equation_sets.first, closed)):
             with suppress(ParameterError, SimulationError, NetworkError):
                 transition = self._joined(closed | joins, self._read(initial, closed | joins))
                 stored = transition[0].stored(start)
@@ -155,32 +156,34 @@ class HybridRun:
 
     def _closed(self) -> dict[int, str]:
         """Switches that the time closes at the start, and their modes."""
-        switches = [k for k, element in enumerate(self.phases.elements) if element.is_switch]
+        switches = [k for k, machine in enumerate(self.equation_sets.machines) if machine.is_switch]
         if not switches:
             return {}
-        regime = self.settling.regime(self.phases.first)
+        regime = self.event_iteration.regime(self.equation_sets.first)
         rest = np.zeros(len(regime.model.states))
-        modes = regime.assembly.first_modes(self._after(regime), rest, regime.p)
-        joins = {k: modes[k] for k in switches if modes[k] != self.phases.first[k]}
-        return joins if self.settling.possible(with_modes(self.phases.first, joins)) else {}
+        modes = regime.equations.first_modes(self._after(regime), rest, regime.p)
+        joins = {k: modes[k] for k in switches if modes[k] != self.equation_sets.first[k]}
+        return joins if self.event_iteration.possible(with_modes(self.equation_sets.first, joins)) else {}
 
     def _read(self, initial: Mapping[str, float] | None, joins: Mapping[int, str]) -> HybridState:
-        """Start values in the equations in which some elements join something."""
-        start, regime = self.demand.span[0], self.settling.regime(with_modes(self.phases.first, joins))
-        assembly = regime.assembly
+        """Start values in the equations in which some machines join something."""
+        start, regime = self.demand.span[0], self.event_iteration.regime(with_modes(self.equation_sets.first, joins))
+        equations = regime.equations
         if isinstance(initial, Mapping) and initial and start != 0:
-            refuse_incomplete(assembly.stores.names, initial, start)
-        x, waves = assembly.model.start(assembly.prepared(regime.p), initial, self.demand.span)
+            refuse_incomplete(equations.stores.names, initial, start)
+        x, waves = equations.model.start(equations.prepared(regime.p), initial, self.demand.span)
         return HybridState(regime, self._beside_waves(regime, x, waves))
 
     def _after(self, regime: Regime) -> float:
         """A time just after the start."""
-        return self.timeline(regime.assembly, regime.p).sides(self.demand.span[0])[1]
+        return self.timeline(regime.equations, regime.p).sides(self.demand.span[0])[1]
 
     def _joined(self, joins: Mapping[int, str], read: HybridState) -> Transition:
-        """The modes that go on from a start that has been read where some elements join something, and the changes."""
+        """The modes that go on from a start that has been read where some machines join something, and the changes."""
         after = self._after(read.regime)
-        return self.settling.settle(self.demand.span[0], after, self.settling.started(after, read.x, joins), None)
+        return self.event_iteration.run(
+            self.demand.span[0], after, self.event_iteration.in_start_modes(after, read.x, joins), None
+        )
 
     def _beside_waves(self, regime: Regime, x: Array, start: Any) -> Array:
         """The states at the start, and behind them what arrives by waves, if there are any."""
@@ -193,39 +196,39 @@ class HybridRun:
 
     def _resumed(self, ending: Ending) -> Transition:
         """The states and modes in which another motion ended, and what changes at that instant."""
-        start, first = self.demand.span[0], self.settling.regime(self.phases.first)
+        start, first = self.demand.span[0], self.event_iteration.regime(self.equation_sets.first)
         x = self._beside_waves(first, np.zeros(len(first.model.states)), ending.waves)
-        moment, changes = self.settling.resumed(ending.beside(first.assembly.arriving(x))), list[Change]()
-        after = self._instants(moment).sides(start)[1]
-        if after != ending.read and moment.regime.form.has_impulses:
-            moment, changes, _ = self.settling.jumped(start, moment, ending.read, after)
-        moment, further = self.settling.settle(start, after, moment, None)
-        return moment, [*changes, *further]
+        state, changes = self.event_iteration.resumed(ending.beside(first.equations.arriving(x))), list[Change]()
+        after = self._instants(state).sides(start)[1]
+        if after != ending.read and state.regime.form.has_impulses:
+            state, changes, _ = self.event_iteration.jumped(start, state, ending.read, after)
+        state, further = self.event_iteration.run(start, after, state, None)
+        return state, [*changes, *further]
 
     def choose(self) -> tuple[str, str]:
         """The engine for the first phase, and why."""
-        moment = self.begin(None)
-        problem = self._problem(self.demand.span[0], moment)
-        return self._engine(moment, lambda: problem) if problem.x0.size else ("exact", PRESCRIBED)
+        state = self.begin(None)
+        problem = self._problem(self.demand.span[0], state)
+        return self._engine(state, lambda: problem) if problem.x0.size else ("exact", PRESCRIBED)
 
-    def _engine(self, moment: HybridState, problem: Callable[[], Problem]) -> tuple[str, str]:
-        regime = moment.regime
-        judged = partial(regime.assembly.judged, regime.p)
-        return self.phases.engine(regime.assembly, regime.modes, lambda: judged(problem()), self.demand.engine)
+    def _engine(self, state: HybridState, problem: Callable[[], Problem]) -> tuple[str, str]:
+        regime = state.regime
+        judged = partial(regime.equations.judged, regime.p)
+        return self.equation_sets.engine(regime.equations, regime.modes, lambda: judged(problem()), self.demand.engine)
 
-    def _suits_heyoka(self, t: float, moment: HybridState) -> bool:
+    def _suits_heyoka(self, t: float, state: HybridState) -> bool:
         """Whether heyoka goes on from a time on: it is what was asked for, or suits the modes."""
-        return self.demand.engine != "auto" or self._engine(moment, lambda: self._problem(t, moment))[0] == "heyoka"
+        return self.demand.engine != "auto" or self._engine(state, lambda: self._problem(t, state))[0] == "heyoka"
 
-    def timeline(self, assembly: ModeEquations, p: Array) -> Timeline:
+    def timeline(self, equations: ModeEquations, p: Array) -> Timeline:
         """The instants at which inputs jump or bend."""
         timelines = self._shared.timelines
-        if assembly.whole not in timelines:
-            timelines[assembly.whole] = assembly.model.switching.timeline(p, *self.demand.span)
-        return timelines[assembly.whole]
+        if equations.whole not in timelines:
+            timelines[equations.whole] = equations.model.switching.timeline(p, *self.demand.span)
+        return timelines[equations.whole]
 
-    def _instants(self, moment: HybridState) -> Timeline:
-        return self.timeline(moment.regime.assembly, moment.regime.p)
+    def _instants(self, state: HybridState) -> Timeline:
+        return self.timeline(state.regime.equations, state.regime.p)
 
     def note(self, t: float, changes: list[Change]) -> None:
         """Put down what has changed at a time.
@@ -235,7 +238,7 @@ class HybridRun:
         """
         if not changes:
             return
-        passed = (t - self.changes[-1].time) / (self.demand.span[1] - self.demand.span[0]) if self.changes else 1.0
+        passed = (t - self.changes[-1].time) / self._duration if self.changes else 1.0
         self.changes += changes
         if passed >= SELDOM:
             self._soon = [0] * len(CHATTER)
@@ -245,17 +248,17 @@ class HybridRun:
             if self._soon[number] > most:
                 last = changes[-1]
                 raise SimulationError(
-                    f"{type(last.element.part.component).__name__} '{last.element.name}' changes again and again "
+                    f"{type(last.machine.part.component).__name__} '{last.machine.name}' changes again and again "
                     f"between '{last.before}' and '{last.after}' at t = {t:.9g} s, {most} times with hardly any time "
                     "going on. Give it damping or its neighbours an inertia, or let it rest (omega_rest)."
                 )
 
-    def _problem(self, t: float, moment: HybridState, passing: InPlaceEvents | None = None) -> Problem:
+    def _problem(self, t: float, state: HybridState, in_place: InPlaceEvents | None = None) -> Problem:
         """The motion from a time on, up to the next instant at which an input jumps."""
-        demand, regime, times = self.demand, moment.regime, self._instants(moment)
+        demand, regime, times = self.demand, state.regime, self._instants(state)
         following = bisect_right(times.stops, t)
         end = min([*times.stops[following : following + 1], demand.span[1]])
-        problem = moment.problem((t, end), times)
+        problem = state.problem((t, end), times)
         states = regime.model.states
         atol = demand.rtol * problem.atol
         atol[: len(states)] = demand.tolerances(problem.atol[: len(states)], states)
@@ -267,17 +270,17 @@ class HybridRun:
             t_eval=self._outputs(t, end),
             max_steps=demand.max_steps - self.steps,
             earlier_steps=self.steps,
-            react=passing,
+            react=in_place,
             progress=demand.progress,
         )
 
-    def _span(self, t: float, moment: HybridState) -> tuple[float, HybridState]:
+    def _span(self, t: float, state: HybridState) -> tuple[float, HybridState]:
         """One run of the engine, up to other equations or an instant at which an input jumps; what goes on then."""
-        regime, form = moment.regime, moment.regime.form
-        bind = partial(regime.assembly.bound, regime.p)
-        refuse_vanishing(form, bind, lambda: np.array([t]), lambda _: moment.x[None])
-        trajectory, passing = self._followed(t, moment)
-        passing.close()
+        regime, form = state.regime, state.regime.form
+        bind = partial(regime.equations.bound, regime.p)
+        refuse_vanishing(form, bind, lambda: np.array([t]), lambda _: state.x[None])
+        trajectory, in_place = self._followed(t, state)
+        in_place.close()
         refuse_vanishing(form, bind, lambda: trajectory.dense.steps, trajectory.dense)
         self.steps += trajectory.statistics.get("steps", 0)
         assert trajectory.end is not None  # noqa: S101 (engines that follow guards say it)
@@ -285,28 +288,28 @@ class HybridRun:
         if self.demand.t_eval is not None and t in trajectory.t[-1:] and t < self.demand.span[1]:
             # an output at an event belongs to the next phase, which has it too
             trajectory = replace(trajectory, t=trajectory.t[:-1], x=trajectory.x[:-1])
-        self.spans.append(Span(trajectory, tuple(passing.phases)))
-        return t, self._settled(t, x[: moment.x.size], passing, trajectory.met)
+        self.spans.append(Span(trajectory, tuple(in_place.phases)))
+        return t, self._next_state(t, x[: state.x.size], in_place, trajectory.met)
 
-    def _settled(self, t: float, x: Array, passing: InPlaceEvents, met: int | None) -> HybridState:
+    def _next_state(self, t: float, x: Array, in_place: InPlaceEvents, met: int | None) -> HybridState:
         """What goes on at the end of a run of the engine, from its states (n,) and the guard that is met, or None."""
-        moment = HybridState(passing.regime, x, passing.bands)
-        sides = self._instants(moment).sides(t)
-        if met is not None and passing.beyond is not None and sides == (t, t):
-            moment, changes = passing.beyond
+        state = HybridState(in_place.regime, x, in_place.bands)
+        sides = self._instants(state).sides(t)
+        if met is not None and in_place.beyond is not None and sides == (t, t):
+            state, changes = in_place.beyond
             self.note(t, changes)
-            return moment
-        if sides != (t, t) and moment.regime.form.has_impulses:
-            moment, changes, at_once = self.settling.jumped(t, moment, *sides)
+            return state
+        if sides != (t, t) and state.regime.form.has_impulses:
+            state, changes, at_once = self.event_iteration.jumped(t, state, *sides)
             self.note(t, changes)
             self.jumps.append(at_once)
             met = None if changes else met
         if met is None and t >= self.demand.span[1]:
-            return moment
-        after = self._instants(moment).sides(t)[1]  # those of other equations, where a jump has led there
-        moment, changes = self.settling.settle(t, after, moment, met)
+            return state
+        after = self._instants(state).sides(t)[1]  # those of other equations, where a jump has led there
+        state, changes = self.event_iteration.run(t, after, state, met)
         self.note(t, changes)
-        return moment
+        return state
 
     def _outputs(self, t: float, end: float) -> Array | None:
         """The output times of a phase: an event belongs to the next one."""
@@ -315,44 +318,36 @@ class HybridRun:
         first, last = self.demand.t_eval.searchsorted((t, end))
         return self.demand.t_eval[first : last + (end == self.demand.span[1])]
 
-    def _followed(self, t: float, moment: HybridState) -> tuple[Trajectory, InPlaceEvents]:
+    def _followed(self, t: float, state: HybridState) -> tuple[Trajectory, InPlaceEvents]:
         """One run of the engine; where heyoka cannot go on, or a stiff phase is long, another engine begins it anew."""
-        passing = InPlaceEvents(self.settling, moment, t, self.note, self._suits_heyoka)
-        problem, noted, soon = self._problem(t, moment, passing), len(self.changes), [*self._soon]
+        in_place = InPlaceEvents(self.event_iteration, state, t, self.note, self._suits_heyoka)
+        problem, noted, soon = self._problem(t, state, in_place), len(self.changes), [*self._soon]
         if not problem.x0.size:
-            still = at_rest(problem, moment.regime.model.degree)
-            return replace(still, end=(problem.t_end, problem.x0)), passing
-        name, why = self._engine(moment, lambda: problem)
+            still = without_states(problem, state.regime.model.degree)
+            return replace(still, end=(problem.t_end, problem.x0)), in_place
+        name, why = self._engine(state, lambda: problem)
         if self.waves is not None:
-            return self._solve(problem, name, why, self.waves.solver(moment.regime)), passing
-        stiff = name != "heyoka"
-        if self.demand.engine != "auto" or (stiff and not self.phases.tries_heyoka(moment.regime.assembly)):
-            return self._solve(problem, name, why), passing
-        most = problem.max_steps
-        tried, last = [("heyoka", min(most, choice.patience(problem)) if stiff else most)], name
-        sticks: StickingError | None = None
-        failed: SeriesError | None = None
-        for engine, steps in tried:
-            try:
-                because = why if failed is None else choice.no_series(failed, engine)
-                return self._solve(changed(problem, max_steps=steps), engine, because), passing
-            except SimulationError as error:
-                failed = error if isinstance(error, SeriesError) and not stiff else failed
-                sticks = error if isinstance(error, StickingError) else sticks
-                if engine == "heyoka" and not stiff and not isinstance(error, SeriesError):
-                    raise
-                if isinstance(error, StickingError) and error.driven_back:
-                    raise
-            if engine == "heyoka" and not stiff:  # only then: whether an engine is installed takes a while to tell
-                *others, (last, _) = choice.without_series(most)
-                tried += others
+            return self._solve(problem, name, why, self.waves.solver(state.regime)), in_place
+        stiff, most = name != "heyoka", problem.max_steps
+        if self.demand.engine != "auto" or (stiff and not self.equation_sets.tries_heyoka(state.regime.equations)):
+            return self._solve(problem, name, why), in_place
+
+        def anew(engine: str, steps: int, because: str) -> tuple[Trajectory, InPlaceEvents]:
             del self.changes[noted:]
             self._soon = [*soon]
-            passing = InPlaceEvents(self.settling, moment, t, self.note)
-            problem = changed(problem, react=passing)
-        if sticks is not None and len(tried) > 1:
-            raise sticks
-        return self._solve(problem, last, why if failed is None else choice.no_series(failed, last)), passing
+            events = InPlaceEvents(self.event_iteration, state, t, self.note)
+            return self._solve(changed(problem, react=events, max_steps=steps), engine, because), events
+
+        steps = min(most, choice.patience(problem)) if stiff else most
+        try:
+            return self._solve(changed(problem, max_steps=steps), "heyoka", why), in_place
+        except SimulationError as error:
+            failed = error
+        if isinstance(failed, SeriesError) and not stiff:
+            return choice.without_series(anew, failed, most)
+        if not stiff or choice.is_driven_back(failed):
+            raise failed
+        return anew(name, most, why)
 
     def _solve(
         self, problem: Problem, name: str, why: str, solver: Callable[[Problem], Trajectory] | None = None

@@ -18,7 +18,7 @@ from shaftwork.components.base import Component
 from shaftwork.hybrid.hybrid_run import HybridRun, Span
 from shaftwork.hybrid.hybrid_state import Change, Regime
 from shaftwork.hybrid.impacts.impulses import summed
-from shaftwork.hybrid.modes.mode_machines import ModeMachine, ModeNames
+from shaftwork.hybrid.modes.mode_machines import ModeMachine
 from shaftwork.results.observer import PhaseRow
 from shaftwork.results.solution import Solution
 
@@ -62,7 +62,7 @@ class Stretch:
     def observer(self) -> ModelObserver:
         """Of the equations."""
         regime = self.regime
-        return ModelObserver(regime.form, lambda: regime.bound, self.instants, regime.assembly.quantities)
+        return ModelObserver(regime.form, lambda: regime.bound, self.instants, regime.equations.quantities)
 
     def stored(self, t: Array, x: Array) -> Array:
         """(k, stores) all that is stored at times (k,) with states (k, n), and behind it what arrives by waves.
@@ -93,7 +93,7 @@ class Stretches:
     def __getitem__(self, number: int) -> Stretch:
         if number not in self._stretches:
             span, (_, regime) = self._pairs[number]
-            instants = self._run.timeline(regime.assembly, regime.p)
+            instants = self._run.timeline(regime.equations, regime.p)
             self._stretches[number] = Stretch(regime, instants, span)
         return self._stretches[number]
 
@@ -235,9 +235,9 @@ class PhaseObserver:
         return self._at(t).observer.read_at(t)
 
     def modes_at(self, t: float) -> dict[str, str]:
-        """The mode of every element at a time in s."""
+        """The mode of every machine at a time in s."""
         regime = self._at(t).regime
-        return {element.name: name for element, name in zip(regime.elements, regime.modes, strict=True)}
+        return {machine.name: name for machine, name in zip(regime.machines, regime.modes, strict=True)}
 
     def _at(self, t: float) -> Stretch:
         return self._stretches[int(self._stretches.numbers(np.array([t]))[0])]
@@ -283,9 +283,9 @@ def _impacts(run: HybridRun) -> tuple[Impact, ...]:
     """Changes and sources with which speeds may jump, those of one time in one, with the part that hits or changes."""
     jumps = [jump for jump in run.jumps if jump.given or jump.lost]
     for change in sorted(run.changes, key=lambda change: (change.time, not change.impact)):
-        modes = change.element.modes
+        modes = change.machine.modes
         if change.rebound or change.given or change.lost or modes[change.before].form != modes[change.after].form:
-            jumps.append(Impact(change.time, change.element.part.name, change.given, change.lost))
+            jumps.append(Impact(change.time, change.machine.part.name, change.given, change.lost))
     by_time: dict[float, Impact] = {}
     for jump in jumps:
         earlier = by_time.get(jump.time, Impact(jump.time, "", {}, {}))
@@ -295,17 +295,17 @@ def _impacts(run: HybridRun) -> tuple[Impact, ...]:
 
 
 def _without_detours(changes: list[Change]) -> list[Change]:
-    """Changes of one instant without those by which an element came back to a mode; but an impact stays."""
+    """Changes of one instant without those by which a machine came back to a mode; but an impact stays."""
     if len(changes) == 1 or any(change.impact for change in changes):
         return changes
     direct: list[Change] = []
     for change in changes:
-        of_element = [earlier for earlier in direct if earlier.element is change.element]
-        back = next((k for k, earlier in enumerate(of_element) if earlier.before == change.after), None)
+        of_machine = [earlier for earlier in direct if earlier.machine is change.machine]
+        back = next((k for k, earlier in enumerate(of_machine) if earlier.before == change.after), None)
         if back is None:
             direct.append(change)
         else:
-            direct = [earlier for earlier in direct if earlier not in of_element[back:]]
+            direct = [earlier for earlier in direct if earlier not in of_machine[back:]]
     return direct
 
 
@@ -313,30 +313,30 @@ def _events(changes: Iterable[Change]) -> Iterator[tuple[float, str, str, str]]:
     """Changes in words, without those that lead nowhere: what says the same before and after is none."""
 
     @cache  # a motion may have thousands of a few kinds
-    def in_words(element: ModeMachine, before: str, after: str, rebound: bool) -> tuple[str, str, str]:  # noqa: FBT001
-        return element.name, element.modes[before].words, "rebound" if rebound else element.modes[after].words
+    def in_words(machine: ModeMachine, before: str, after: str, rebound: bool) -> tuple[str, str, str]:  # noqa: FBT001
+        return machine.name, machine.modes[before].words, "rebound" if rebound else machine.modes[after].words
 
     at_once = (_without_detours([*one_time]) for _, one_time in groupby(changes, attrgetter("time")))
-    for time, *change in chain.from_iterable(at_once):
-        name, was, now = in_words(*change[:4])
+    for change in chain.from_iterable(at_once):
+        name, was, now = in_words(change.machine, change.before, change.after, change.rebound)
         if was != now:
-            yield time, name, was, now
+            yield change.time, name, was, now
 
 
 def _table(run: HybridRun) -> tuple[PhaseRow, ...]:
     """The phases in words: those that say the same are one."""
-    phases, elements = [phase for span in run.spans for phase in span.phases], run.phases.elements
+    phases, machines = [phase for span in run.spans for phase in span.phases], run.equation_sets.machines
     last = run.demand.span[1]
     by_words: dict[tuple[str, ...], Mapping[str, str]] = {}
 
     @cache
-    def in_words(modes: ModeNames) -> Mapping[str, str]:
-        words = tuple(element.modes[name].words for element, name in zip(elements, modes, strict=True))
-        return by_words.setdefault(words, dict(zip((element.name for element in elements), words, strict=True)))
+    def in_words(regime: Regime) -> Mapping[str, str]:
+        words = tuple(machine.modes[name].words for machine, name in zip(machines, regime.modes, strict=True))
+        return by_words.setdefault(words, dict(zip((machine.name for machine in machines), words, strict=True)))
 
     rows: list[tuple[float, Mapping[str, str]]] = []
     for phase, end in zip(phases, [*(phase.start for phase in phases[1:]), last], strict=True):
-        modes = in_words(phase.regime.modes)
+        modes = in_words(phase.regime)
         if end > phase.start and not (rows and rows[-1][1] is modes):
             rows.append((phase.start, modes))
     ends = [*(start for start, _ in rows[1:]), last]

@@ -1,8 +1,7 @@
-"""A moment of a motion through phases: modes, states, how far rounding moves the guards, and which are exceeded."""
+"""A hybrid state: the modes of all machines, and the states; how far rounding moves guards, and which are exceeded."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cached_property, partial
 from types import MappingProxyType
@@ -20,25 +19,17 @@ from shaftwork.components.branches import INTEGRAL
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Leave, Mode
 from shaftwork.formulation.form import StateForm
+from shaftwork.hybrid.consistency import (
+    clear_of_limit,
+    drift,
+    moved_by_rounding,
+    rounding_moves,
+    side_of_limit,
+)
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import ActiveGuard, ModeMachine, ModeNames
 from shaftwork.integrate.problem import Guards, Problem, changed
-from shaftwork.pipeline.arguments import NOMINAL
 from shaftwork.pipeline.model import Model
-
-ROUNDINGS = 64.0
-"""A guard within so many rounding units of zero is on its limit, and only its further course tells its side."""
-CLEAR = 8
-"""A phase that starts at a limit or beyond meets it again where it is farther beyond by so many bands."""
-NOTHING = 1e-200
-"""What is as good as zero, and is not."""
-EPS = float(np.finfo(float).eps)
-AHEAD, AHEAD_OF_RUN = 1e-3, 1e-7
-"""How far ahead the further course is looked at: parts of the time in which a state moves by its nominal size, and of
-the run."""
-GOLDEN = (5**0.5 - 1) / 2
-FEW = 4
-"""What a look ahead gains must be more than so many rounding units."""
 
 Course = tuple[float, list[float], list[float], list[float]]
 """Time, states, their rates, and guards."""
@@ -48,13 +39,13 @@ Excess = tuple[float, ActiveGuard]
 
 
 class Change(NamedTuple):
-    """A change of mode: when in s, of which element, from which mode to which; or a rebound, back to the one before.
+    """A change of mode: when in s, of which machine, from which mode to which; or a rebound, back to the one before.
 
     With an impact speeds jump; sources of speed have given energy at once, and gears have lost some, in J by part.
     """
 
     time: float
-    element: ModeMachine
+    machine: ModeMachine
     before: str
     after: str
     rebound: bool = False
@@ -64,10 +55,10 @@ class Change(NamedTuple):
 
 
 def differences(
-    t: float, elements: Sequence[ModeMachine], before: ModeNames, after: ModeNames, besides: Collection[int] = ()
+    t: float, machines: Sequence[ModeMachine], before: ModeNames, after: ModeNames, besides: Collection[int] = ()
 ) -> list[Change]:
-    """The changes at a time in s from modes to others, in the order of the elements, but for some of these."""
-    triples = enumerate(zip(elements, before, after, strict=True))
+    """The changes at a time in s from modes to others, in the order of the machines, but for some of these."""
+    triples = enumerate(zip(machines, before, after, strict=True))
     return [Change(t, *names) for k, names in triples if k not in besides and names[1] != names[2]]
 
 
@@ -75,18 +66,18 @@ class Regime:
     """A combination of modes with its equations, bound to the parameters of a run.
 
     Args:
-        modes: of every element.
-        assembly: the equations.
+        modes: of every machine.
+        equations: the equations.
         p: their parameters, numbers of modes among them.
         tick: how far in s rounding moves the time.
         longest: how far in s the further course is looked at, at most.
     """
 
-    def __init__(self, modes: ModeNames, assembly: ModeEquations, p: Array, tick: float, longest: float) -> None:
-        self.modes, self.assembly, self.p, self.tick, self.longest = modes, assembly, p, tick, longest
-        self.motion, self.limits, self.near = assembly.motion(p)
+    def __init__(self, modes: ModeNames, equations: ModeEquations, p: Array, tick: float, longest: float) -> None:
+        self.modes, self.equations, self.p, self.tick, self.longest = modes, equations, p, tick, longest
+        self.motion, self.limits, self.near = equations.motion(p)
         """Rates and guards at an instant; the guards alone; the guards around an instant, by the `moves` of states."""
-        self.sizes, self.sides, self.watched = assembly.sizes(p), assembly.sides(modes), assembly.watched(modes)
+        self.sizes, self.sides, self.watched = equations.sizes(p), equations.sides(modes), equations.watched(modes)
         """Nominal size of each state; on which side each guard is met; everything that may end one of the modes."""
         self.successors: dict[int, Any] = {}
         """By guard, where it leads in place; told when it is first met."""
@@ -94,36 +85,36 @@ class Regime:
     @property
     def model(self) -> Model:
         """The compiled equations."""
-        return self.assembly.model
+        return self.equations.model
 
     @property
     def form(self) -> StateForm:
         """The state form of the equations."""
-        return self.assembly.model.form
+        return self.equations.model.form
 
     @property
     def stores(self) -> StateTransfer:
         """What the equations store."""
-        return self.assembly.stores
+        return self.equations.stores
 
     @property
     def bound(self) -> BoundArrays:
         """The array program with its parameters."""
-        return self.assembly.bound(self.p)
+        return self.equations.bound(self.p)
 
     @property
-    def elements(self) -> tuple[ModeMachine, ...]:
+    def machines(self) -> tuple[ModeMachine, ...]:
         """Of the network."""
-        return self.assembly.elements
+        return self.equations.machines
 
     def mode(self, number: int) -> Mode:
-        """The mode of an element."""
-        return self.elements[number].modes[self.modes[number]]
+        """The mode of a machine."""
+        return self.machines[number].modes[self.modes[number]]
 
     @cached_property
     def problem(self) -> Problem:
         """What is the same in all phases of these modes; the rest is empty."""
-        return self.assembly.problem(self.modes, self.p)
+        return self.equations.problem(self.modes, self.p)
 
     @cached_property
     def bends(self) -> bool:
@@ -137,30 +128,28 @@ class Regime:
         return tuple((active.guard, active.side) for active in self.watched)
 
     @cached_property
-    def equations(self) -> Callable[[], Callable[[float, Array], Array]]:
+    def right_side(self) -> Callable[[], Callable[[float, Array], Array]]:
         """Makes the right-hand side."""
-        return partial(self.assembly.right_side, self.p)
+        return partial(self.equations.right_side, self.p)
 
     @cached_property
     def moves(self) -> Moves:
         """Of each state a part of it and the least that rounding moves it, to both sides and not alike; the side; and
         how far a look ahead takes it.
         """
-        parts = [(-1) ** k * (0.5 + k * GOLDEN % 1) * ROUNDINGS * EPS for k in range(len(self.sizes))]
-        pairs = zip(parts, self.sizes, strict=True)
-        return [(part, part * size / NOMINAL, math.copysign(1.0, part), AHEAD * size) for part, size in pairs]
+        return rounding_moves(self.sizes)
 
     @cached_property
     def values(self) -> Array:
         """The parameters and what else the equations are made of."""
-        return self.assembly.values(self.p)
+        return self.equations.values(self.p)
 
     def constant(self, number: int, expression: Expr | None) -> float:
-        """A number that is made of an element's parameters."""
-        return self.assembly.constant(number, expression, self.p)
+        """A number that is made of a machine's parameters."""
+        return self.equations.constant(number, expression, self.p)
 
     def twist_limit(self, number: int, leave: Leave) -> tuple[float, float]:
-        """The twist in rad at which a mode ends by the twist of its element, and the slope of the guard there."""
+        """The twist in rad at which a mode ends by the twist of its machine, and the slope of the guard there."""
         slope = float(leave.when.diff(INTEGRAL))
         return -self.constant(number, leave.when.xreplace({INTEGRAL: Integer(0)})) / slope, slope
 
@@ -170,12 +159,9 @@ class Regime:
 
     def beside(self, here: Course, side: float = 1.0) -> tuple[float, list[float]]:
         """The time and the states as far away as rounding may move them, to one side or to the other, -1."""
-        t, x, rates, _ = here
-        each, tick = zip(x, rates, self.moves, strict=True), self.tick
-        # all of it to the same side: what a tick moves must not make up for the rest
-        return t + side * tick, [
-            v + side * (part * abs(v) + least + sign * tick * abs(rate)) for v, rate, (part, least, sign, _) in each
-        ]
+        (t, x, rates, _), tick = here, self.tick
+        triples = zip(x, rates, self.moves, strict=True)
+        return t + side * tick, [moved_by_rounding(v, rate, move, tick, side) for v, rate, move in triples]
 
     def bands(self, here: Course, beside: Sequence[float] | None = None) -> list[float]:
         """How far rounding moves each guard: on the side on which no law switches, where one is about to.
@@ -217,21 +203,21 @@ class HybridState(NamedTuple):
         return self.regime.course(t, self.x.tolist())
 
     def across(self, number: int, t: float) -> float:
-        """The speed across an element at a time in s."""
+        """The speed across a machine at a time in s."""
         return self.speeds((number,), t)[0]
 
     def speeds(self, numbers: Sequence[int], t: float) -> list[float]:
-        """The speeds across elements at a time in s."""
-        return self.regime.assembly.across(numbers, t, self.x, self.regime.p)
+        """The speeds across machines at a time in s."""
+        return self.regime.equations.across(numbers, t, self.x, self.regime.p)
 
     def stored(self, t: float) -> dict[str, float]:
         """All that is stored, and what arrives by waves, by name, with the inputs of a time in s."""
         regime, stores = self.regime, self.regime.stores
         values = stores.of(lambda: regime.bound, np.array([t]), self.x[None, :])[0]
-        return dict(zip(stores.names, values.tolist(), strict=True)) | regime.assembly.arriving(self.x)
+        return dict(zip(stores.names, values.tolist(), strict=True)) | regime.equations.arriving(self.x)
 
     def differs(self, other: HybridState, t: float, least: float) -> bool:
-        """Whether what is stored at another moment of the same time in s differs by more than so much."""
+        """Whether what is stored in another hybrid state of the same time in s differs by more than so much."""
         stored, others = self.stored(t), other.stored(t)
         return any(abs(others[name] - value) > least for name, value in stored.items())
 
@@ -245,8 +231,8 @@ class HybridState(NamedTuple):
 
         Its states are those of the equations and, behind them, the integrals of the guards in their `clocks`.
         """
-        regime, assembly = self.regime, self.regime.assembly
-        whole, sizes = regime.problem, assembly.clock_sizes(span, self.x, regime.p)
+        regime, equations = self.regime, self.regime.equations
+        whole, sizes = regime.problem, equations.clock_sizes(span, self.x, regime.p)
         guards = whole.guards
         assert guards is not None  # noqa: S101 (which the equations give)
         now = np.abs(regime.limits(span[0], self.x.tolist()))
@@ -269,23 +255,8 @@ Transition = tuple[HybridState, list[Change]]
 """The state that follows at an instant, and the changes of mode that lead there."""
 
 
-def clear_of_limit(beyond: float, band: float) -> float:
-    """How far beyond zero a guard is met: more where it is near its limit or beyond, for a phase that starts there has
-    not met it.
-
-    It is not zero: where a value is exactly zero at the start of a step, heyoka finds none of its later zeros in it.
-
-    Args:
-        beyond: how far it is beyond now; negative within its limit.
-        band: how far rounding moves it.
-    """
-    if 2 * beyond > -CLEAR * band:
-        return max(beyond, 0.0) + CLEAR * band or NOTHING
-    return band / CLEAR or NOTHING
-
-
 def exceeded(
-    moment: HybridState,
+    state: HybridState,
     t: float,
     ended: HybridState,
     idle: Sequence[ActiveGuard] = (),
@@ -293,32 +264,33 @@ def exceeded(
     in_order: bool = False,
     again: bool = False,
 ) -> tuple[HybridState, list[Excess]]:
-    """The guards beyond their limits, or on them and about to go beyond, and how far; the moment with its bands.
+    """The guards beyond their limits, or on them and about to go beyond, and how far; the hybrid state with its bands.
 
     Args:
-        moment: modes and states.
+        state: modes and states.
         t: s.
-        ended: the moment before any change.
+        ended: the state before any change.
         idle: guards that were met here already and change nothing.
         in_order: whether the first one will be taken, and not the worst.
         again: whether modes have come back.
     """
-    regime, here = moment.regime, moment.course(t)
+    regime, here = state.regime, state.course(t)
     beside, now = regime.course(*regime.beside(here)), here[3]
     bands = regime.bands(here, beside[3])
     wide = bands
-    if ended.bands and ended.regime.assembly is regime.assembly:
+    if ended.bands and ended.regime.equations is regime.equations:
         wide = list(map(max, bands, ended.bands))
     beyond, on_limit, clear = [], [], [0.0] * len(now)
     for active in regime.watched:
-        band, value = wide[active.guard], active.side * now[active.guard]
-        clear[active.guard] = clear_of_limit(value, bands[active.guard])
-        if value < -band or active in idle:
+        excess = active.side * now[active.guard]
+        clear[active.guard] = clear_of_limit(excess, bands[active.guard])
+        side = side_of_limit(excess, wide[active.guard])
+        if side < 0 or active in idle:
             continue
-        if value <= band or active.leave.rebound is not None:  # only what comes nearer is thrown back
+        if side == 0 or active.leave.rebound is not None:  # only what comes nearer is thrown back
             on_limit.append(active)
-        elif value > 0:
-            beyond.append((value, active))
+        else:
+            beyond.append((excess, active))
     # impacts come first: torques are those of the motion after them
     hits = [excess for excess in beyond if not excess[1].leave.by_torque]
     # then what the time ends: what else gives way shows when all of that has changed
@@ -328,7 +300,7 @@ def exceeded(
         soon_beyond = leaving(regime, here, beside, on_limit, again=again)
         hits = [excess for excess in soon_beyond if excess[1].leave.rebound is not None]
         beyond = beyond + soon_beyond if in_order else beyond or soon_beyond
-    return HybridState(regime, moment.x, clear), hits or beyond
+    return HybridState(regime, state.x, clear), hits or beyond
 
 
 def leaving(regime: Regime, here: Course, beside: Course, on_limit: list[ActiveGuard], *, again: bool) -> list[Excess]:
@@ -336,7 +308,7 @@ def leaving(regime: Regime, here: Course, beside: Course, on_limit: list[ActiveG
 
     Args:
         regime: the modes.
-        here: the course at the moment.
+        here: the course at the instant.
         beside: rounding away from it.
         on_limit: the guards.
         again: whether modes have come back: then what hardly moves yet stays as it is, and its motion will tell. The
@@ -350,8 +322,7 @@ def leaving(regime: Regime, here: Course, beside: Course, on_limit: list[ActiveG
         for active in on_limit:
             k, side = active.guard, active.side
             gain, other = side * (ahead[3][k] - here[3][k]), side * (ahead_beside[3][k] - beside[3][k])
-            units = abs(beside[3][k] - here[3][k]) / ROUNDINGS
-            if abs(gain) > max(abs(gain - other), FEW * units):
+            if drift(gain, other, abs(beside[3][k] - here[3][k])):
                 moving.append((gain, active))
         beyond = [one for one in moving if one[0] > 0]
         if beyond:
@@ -371,25 +342,26 @@ def _further(regime: Regime, step: float, here: Course, *, bends: bool) -> Cours
     )
 
 
-def passes_limit(moment: HybridState, t: float) -> bool:
+def passes_limit(state: HybridState, t: float) -> bool:
     """Whether the states are beyond a guard of the modes by more than rounding moves it."""
-    now = moment.regime.limits(t, moment.x.tolist())
-    wide = moment.bands or [0.0] * len(now)
-    return any(active.side * now[active.guard] > wide[active.guard] for active in moment.regime.watched)
+    now = state.regime.limits(t, state.x.tolist())
+    wide = state.bands or [0.0] * len(now)
+    watched = state.regime.watched
+    return any(side_of_limit(active.side * now[active.guard], wide[active.guard]) > 0 for active in watched)
 
 
-def resting(moment: HybridState, t: float) -> dict[int, str]:
+def resting(state: HybridState, t: float) -> dict[int, str]:
     """Elements that slip, with no speed across them as others hold their ends, and the modes in which they hold."""
-    regime, slipping = moment.regime, dict[int, ActiveGuard]()
+    regime, slipping = state.regime, dict[int, ActiveGuard]()
     for active in regime.watched:
-        k = active.element
-        modes, name = regime.elements[k].modes, regime.modes[k]
+        k = active.machine
+        modes, name = regime.machines[k].modes, regime.modes[k]
         if active.leave.to and any(back.by_torque and back.to == name for back in modes[active.leave.to].leaves):
             slipping[k] = active
     if not slipping:
         return {}
-    here = moment.course(t)
-    now, near, still = here[3], regime.limits(*regime.beside(here)), regime.assembly.resting
+    here = state.course(t)
+    now, near, still = here[3], regime.limits(*regime.beside(here)), regime.equations.resting
     return {
         k: active.leave.to
         for k, active in slipping.items()

@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array
+from shaftwork.hybrid.consistency import CLEAR, clear_of_limit, side_of_limit
 from shaftwork.hybrid.event_iteration import EventIteration
-from shaftwork.hybrid.hybrid_state import CLEAR, Change, HybridState, Regime, Transition, clear_of_limit
+from shaftwork.hybrid.hybrid_state import Change, HybridState, Regime, Transition
 from shaftwork.hybrid.modes.mode_machines import ActiveGuard, ModeMachine, is_same, with_modes
 from shaftwork.integrate.problem import Reaction, SeriesError
 
@@ -38,7 +39,7 @@ Entry = tuple[Sequence[float], Sequence[float], list[float], Array | None]
 """Guards at an instant and later, how far beyond zero each is met, and the states if they are other ones."""
 
 
-def _always(_t: float, _moment: HybridState) -> bool:
+def _always(_t: float, _state: HybridState) -> bool:
     return True
 
 
@@ -50,8 +51,8 @@ class ModeChange:
         to: the modes that follow.
         side: on which the guard was met.
         watched: guards and sides of those modes, and whether each must be within its limit there.
-        change: its element, and the modes before and after.
-        holds: whether the element comes to hold its ends together, or does so no more.
+        change: its machine, and the modes before and after.
+        holds: whether the machine comes to hold its ends together, or does so no more.
     """
 
     to: Regime
@@ -64,11 +65,11 @@ class ModeChange:
 class InPlaceEvents:
     """Lets an engine go on past guards; `Problem.react`.
 
-    A change that leaves all other modes as they are is looked up and checked here; any other is settled in full.
+    A change that leaves all other modes as they are is looked up and checked here; the event iteration makes any other.
 
     Args:
-        settling: changes modes.
-        moment: at the start of the engine's run.
+        event_iteration: of all other changes.
+        state: at the start of the engine's run.
         start: s.
         note: is told what has changed.
         suits: whether the engine goes on well from a time on.
@@ -76,17 +77,17 @@ class InPlaceEvents:
 
     def __init__(
         self,
-        settling: EventIteration,
-        moment: HybridState,
+        event_iteration: EventIteration,
+        state: HybridState,
         start: float,
         note: Callable[[float, list[Change]], None],
         suits: Callable[[float, HybridState], bool] = _always,
     ) -> None:
-        self._settling, self._suits = settling, suits
-        self.regime, self.bands = moment.regime, moment.bands
+        self._event_iteration, self._suits = event_iteration, suits
+        self.regime, self.bands = state.regime, state.bands
         """The modes that go on, and how far rounding moves each guard."""
         self._note: Callable[[float, list[Change]], None] | None = note
-        self._size = moment.x.size
+        self._size = state.x.size
         self.phases = [Phase(start, self.regime)]
         """The phases so far."""
         self._reactions: list[Reaction] = []
@@ -99,20 +100,20 @@ class InPlaceEvents:
             return self._reactions[number]
         if self.beyond is not None or self._note is None:
             return None
-        successor = self._direct(met, t, x) or self._settled(met, t, x)
+        successor = self._by_this_guard(met, t, x) or self._by_iteration(met, t, x)
         if successor is None:
             return None
         regime, bands, changes, y = successor
         if regime not in self._suited:
-            moment = HybridState(regime, x[: self._size].copy() if y is None else y, bands)
-            if not self._suits(t, moment):
-                self.beyond = moment, changes
+            state = HybridState(regime, x[: self._size].copy() if y is None else y, bands)
+            if not self._suits(t, state):
+                self.beyond = state, changes
                 return None
             self._suited.add(regime)
         self.regime, self.bands = regime, bands
         self._note(t, changes)
         self.phases.append(Phase(t, regime))
-        reaction = Reaction(regime.values, regime.ends, bands, regime.equations, y)
+        reaction = Reaction(regime.values, regime.ends, bands, regime.right_side, y)
         self._reactions.append(reaction)
         return reaction
 
@@ -123,15 +124,15 @@ class InPlaceEvents:
         """
         self._note, self._suits = None, _always
 
-    def _settled(self, met: int, t: float, x: Array) -> Successor | None:
+    def _by_iteration(self, met: int, t: float, x: Array) -> Successor | None:
         before = HybridState(self.regime, x[: self._size].copy(), self.bands)
         self.refuse_missed(met, t, x)
-        moment, changes = self._settling.settle(t, t, before, met)
-        if moment.x is before.x:
-            return moment.regime, moment.bands, changes, None
-        if moment.regime.assembly.whole is self.regime.assembly.whole and is_same(moment.x, before.x):
-            return moment.regime, moment.bands, changes, moment.x
-        self.beyond = moment, changes  # other equations, or an impact in these
+        state, changes = self._event_iteration.run(t, t, before, met)
+        if state.x is before.x:
+            return state.regime, state.bands, changes, None
+        if state.regime.equations.whole is self.regime.equations.whole and is_same(state.x, before.x):
+            return state.regime, state.bands, changes, state.x
+        self.beyond = state, changes  # other equations, or an impact in these
         return None
 
     def refuse_missed(self, met: int | None, t: float, x: Array) -> None:
@@ -145,18 +146,18 @@ class InPlaceEvents:
         here = regime.course(t, x[: self._size].tolist())
         now, before = here[3], regime.limits(*regime.later(here, -LATE * regime.tick))
         if any(map(math.isnan, now)):
-            error = regime.assembly.without_value(regime.p, regime.modes, np.array([t]), np.array([here[1]]))
+            error = regime.equations.without_value(regime.p, regime.modes, np.array([t]), np.array([here[1]]))
             if error is not None:
                 raise error
         for active in regime.watched:
             k, side = active.guard, active.side
             if k != met and min(side * now[k], side * before[k]) > CLEAR * bands[k]:
-                name, mode = regime.elements[active.element].name, regime.mode(active.element)
+                name, mode = regime.machines[active.machine].name, regime.mode(active.machine)
                 words = f"'{name}' ceased to be {mode.words} before t = {t:.9g} s"
                 cause = f"{words}, and the series of heyoka have not shown it"
                 raise SeriesError(f"The heyoka engine has not seen that {words}. Take engine='scipy'.", cause)
 
-    def _direct(self, met: int, t: float, x: Array) -> Successor | None:
+    def _by_this_guard(self, met: int, t: float, x: Array) -> Successor | None:
         """The modes that follow by this guard alone, or None where it takes more to tell.
 
         The same as in `EventIteration`, for the guards of one combination of modes only: it is asked at every change.
@@ -167,9 +168,9 @@ class InPlaceEvents:
             return None
         entry, changes = self._entered(step, t, x), [Change(t, *step.change)]
         if isinstance(entry, int):
-            element, before, _ = step.change
+            machine, before, _ = step.change
             step = self._successor(step.to, entry) if step.holds else None
-            if step is None or step.change[0] is not element or not step.holds or step.change[2] == before:
+            if step is None or step.change[0] is not machine or not step.holds or step.change[2] == before:
                 return None
             entry, changes = self._entered(step, t, x), [*changes, Change(t, *step.change)]
         if entry is None or isinstance(entry, int):
@@ -186,38 +187,40 @@ class InPlaceEvents:
         """
         to, before, y = step.to, self.bands, None
         if step.holds:
-            y = to.assembly.taking_over(x[: self._size], to.p)
+            y = to.equations.taking_over(x[: self._size], to.p)
             if y is None:  # what comes to hold stops something
                 return None
         states = (x if y is None else y).tolist()[: self._size]
         now, near, later = to.near(t, states, to.tick, to.moves, to.longest)
         bands = [0.0] * len(now)
         for guard, side, other in step.watched:
-            beyond, band = side * now[guard], abs(near[guard] - now[guard])
-            if other and (beyond >= -band or beyond >= -before[guard]):
-                return guard if beyond > max(band, before[guard]) else None
-            bands[guard] = clear_of_limit(beyond, band)
+            excess, band = side * now[guard], abs(near[guard] - now[guard])
+            # nearly all guards are far from their limits, and a call for each would show at every event
+            if other and (excess >= -band or excess >= -before[guard]):
+                return guard if side_of_limit(excess, max(band, before[guard])) > 0 else None
+            bands[guard] = clear_of_limit(excess, band)
         return now, later, bands, y
 
     def _successor(self, regime: Regime, met: int) -> ModeChange | None:
         """Where a guard leads in the same equations."""
-        if met not in regime.successors:
-            regime.successors.setdefault(met, self._change_by(regime, met))
-        change: ModeChange | None = regime.successors[met]
+        try:
+            change: ModeChange | None = regime.successors[met]
+        except KeyError:
+            change = regime.successors.setdefault(met, self._change_by(regime, met))
         return change
 
     def _change_by(self, regime: Regime, met: int) -> ModeChange | None:
         ended, *others = (active for active in regime.watched if active.guard == met)
-        number = ended.element
-        element, leave, before = regime.elements[number], ended.leave, regime.modes[number]
+        number = ended.machine
+        machine, leave, before = regime.machines[number], ended.leave, regime.modes[number]
         if others or not leave.to or leave.rebound is not None:
             return None
-        holds = element.modes[leave.to].form != element.modes[before].form
-        if holds and not regime.assembly.holds_by_numbers(number):
+        holds = machine.modes[leave.to].form != machine.modes[before].form
+        if holds and not regime.equations.holds_by_numbers(number):
             return None
-        to = self._settling.regime(with_modes(regime.modes, {number: leave.to}))
+        to = self._event_iteration.regime(with_modes(regime.modes, {number: leave.to}))
         watched = tuple((one.guard, one.side, _tells(ended, one, holds=holds)) for one in to.watched)
-        return ModeChange(to, ended.side, watched, (element, before, leave.to), holds)
+        return ModeChange(to, ended.side, watched, (machine, before, leave.to), holds)
 
 
 def _tells(ended: ActiveGuard, active: ActiveGuard, *, holds: bool) -> bool:
@@ -226,5 +229,5 @@ def _tells(ended: ActiveGuard, active: ActiveGuard, *, holds: bool) -> bool:
     What gives way is at rest, and about to move as the torque that it has met grows.
     """
     if holds:
-        return active.element != ended.element or not active.leave.by_speed
+        return active.machine != ended.machine or not active.leave.by_speed
     return active.guard != ended.guard or active.side == ended.side

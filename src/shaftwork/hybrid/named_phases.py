@@ -21,7 +21,7 @@ from shaftwork.core.errors import ParameterError
 from shaftwork.equations.kirchhoff import kirchhoff
 from shaftwork.equations.records import Equations, NamedPhase
 from shaftwork.formulation.form import StateForm, state_form
-from shaftwork.hybrid.modes.mode_machines import at_rest, elements_of
+from shaftwork.hybrid.modes.mode_machines import machines_of, with_laws_of_rest
 from shaftwork.network.graph import CircuitGraph, GraphPart, build_graph
 from shaftwork.network.netlist import Netlist
 
@@ -76,10 +76,10 @@ def in_phase(netlist: Netlist, graph: CircuitGraph, phase: str) -> Netlist:
         ParameterError: no part or mode has this name.
     """
     chosen: dict[str, tuple[ModeChoice, ...]] = {}
-    for element, mode in zip(elements_of(graph), modes_in(graph, phase), strict=True):
-        chosen[element.part.name] = (*chosen.get(element.part.name, ()), ModeChoice(mode.form, mode.value))
+    for machine, mode in zip(machines_of(graph), modes_in(graph, phase), strict=True):
+        chosen[machine.part.name] = (*chosen.get(machine.part.name, ()), ModeChoice(mode.form, mode.value))
     in_modes = netlist.with_choices(chosen)
-    return at_rest(in_modes, state_form(build_graph(in_modes)))
+    return with_laws_of_rest(in_modes, state_form(build_graph(in_modes)))
 
 
 def whole_name(graph: CircuitGraph, phase: str = "") -> str:
@@ -97,36 +97,36 @@ def words_of_modes(graph: CircuitGraph, phase: str) -> dict[str, str]:
     Raises:
         ParameterError: no part or mode has this name.
     """
-    pairs = zip(elements_of(graph), modes_in(graph, phase), strict=True)
-    return {element.name: mode.words for element, mode in pairs}
+    pairs = zip(machines_of(graph), modes_in(graph, phase), strict=True)
+    return {machine.name: mode.words for machine, mode in pairs}
 
 
 def modes_in(graph: CircuitGraph, phase: str) -> tuple[Mode, ...]:
-    """The mode of every element in a phase; the first one of those that are not named.
+    """The mode of every machine in a phase; the first one of those that are not named.
 
     Raises:
         ParameterError: no part or mode has this name.
     """
     if not isinstance(phase, str):
         raise ParameterError(f"phase = {phase!r} must be a text such as 'gap open'. {known_modes(graph)}")
-    elements = elements_of(graph)
+    machines = machines_of(graph)
     named = dict(_named(graph, words) for words in filter(None, (part.strip() for part in phase.split(","))))
-    return tuple(named.get(element.name, element.modes.options[0]) for element in elements)
+    return tuple(named.get(machine.name, machine.modes.options[0]) for machine in machines)
 
 
 def _named(graph: CircuitGraph, words: str) -> tuple[str, Mode]:
-    """The element and its mode of which some words are."""
-    for element in elements_of(graph):
-        for mode in element.modes.options:
-            if words in (f"{element.name} {mode.words}", f"{element.name} {mode.name}"):
-                return element.name, mode
+    """The machine and its mode of which some words are."""
+    for machine in machines_of(graph):
+        for mode in machine.modes.options:
+            if words in (f"{machine.name} {mode.words}", f"{machine.name} {mode.name}"):
+                return machine.name, mode
     raise ParameterError(f"There is no phase '{words}'. {known_modes(graph)}")
 
 
 def known_modes(graph: CircuitGraph) -> str:
     """The parts that change their mode with their modes, as the end of a message."""
-    elements = elements_of(graph)
-    options = [f"{e.name} {' | '.join(dict.fromkeys(mode.words for mode in e.modes.options))}" for e in elements]
+    machines = machines_of(graph)
+    options = [f"{e.name} {' | '.join(dict.fromkeys(mode.words for mode in e.modes.options))}" for e in machines]
     return f"There are: {'; '.join(options)}." if options else "No part of this network changes its mode."
 
 
@@ -137,9 +137,9 @@ def span_of(graph: CircuitGraph, phase: str) -> Span:
         ParameterError: no part or mode has this name.
     """
     low, high = ALWAYS
-    for element, mode in zip(elements_of(graph), modes_in(graph, phase), strict=True):
-        values = _values(graph, element.part)
-        spans = [_begins(other.starts, values) for other in element.modes.options if other.words == mode.words]
+    for machine, mode in zip(machines_of(graph), modes_in(graph, phase), strict=True):
+        values = _values(graph, machine.part)
+        spans = [_begins(other.starts, values) for other in machine.modes.options if other.words == mode.words]
         first, last = min(begin for begin, _ in spans), max(end for _, end in spans)
         if first < last:  # no motion begins in a contact of rigid flanks, and it is at any time
             low, high = max(low, first), min(high, last)

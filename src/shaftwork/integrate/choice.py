@@ -2,36 +2,35 @@
 
 from __future__ import annotations
 
-import importlib
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
+from typing import TypeVar
 
 from shaftwork.core.errors import MissingExtraError, ParameterError, SimulationError
 from shaftwork.integrate.engines import ADAMS, ENGINES, INNER
-from shaftwork.integrate.problem import Engine, Problem, SeriesError, StickingError, Trajectory
+from shaftwork.integrate.problem import Engine, Problem, SeriesError, StickingError, Trajectory, changed
+
+Run = TypeVar("Run")
+"""What a run with an engine gives."""
 
 # Why another engine goes on where heyoka stopped.
 NO_SERIES = "There is no Taylor series of the whole motion: {}. So {} is taken."
 IN_WORDS = {"scipy": "scipy's DOP853", "sundials": "the implicit CVODE"}
 
 
-# The exact engine is taken up to this estimate of its time; an adaptive one may then be the faster. On a damped chain
-# the banded engine is: 0.3 s at 1400 states and rtol 1e-8, where the exact one takes 4 s.
-LONGEST_EXACT, LONGEST_EXACT_CHAIN = 10.0, 1.0
+# On a damped chain the exact engine is taken up to this estimate of its time in s; the banded one may then be the
+# faster, with 0.3 s at 1400 states and rtol 1e-8, where the exact one takes 4 s.
+LONGEST_EXACT_CHAIN = 1.0
 # Beyond this many states the banded engine is taken for stiff chains. A Kloss motor on a damped shaft of 601 states, at
 # rtol 1e-6: 0.34 s (error 2e-6 of the largest torque), CVODE 13 s (error 1.5e-4); with 61 states 0.2 s and 1.6 s. There
 # and on chains of 10000 elements it takes some hundred steps, each as long as some explicit ones.
 LARGEST_NOT_BANDED, FEWEST_NOT_BANDED = 300, 1e4
-# Times of one step in s, measured at a few states on one core; only their ratios matter.
-HEYOKA_STEP_PER_STATE, DOP853_STEP = 2e-7, 2e-4
-CVODE_STEP, RADAU_STEP = 5e-5, 2e-3
+STEP = {"scipy": 2e-4, "sundials": 5e-5, "scipy-radau": 2e-3, "heyoka": 2e-7}
+"""Times of one step in s, that of heyoka for each state, measured at a few states on one core; their ratios matter."""
 # An implicit method takes about so many steps for a transient and for a radian of an oscillation at rtol 1e-8.
 TRANSIENT_STEPS, STEPS_PER_RADIAN = 300.0, 20.0
-
-
-# So many steps of scipy take some seconds. A motion that comes to rest where a law has an infinite slope, as that of a
-# square root of the speed does, is infinitely stiff there, and an explicit method would need a million.
-LONG_FOR_SCIPY = 5000
 
 # Of these no run is so long that the rounding of speeds spoils torques: the stiffness bounds their steps.
 EXPLICIT = ("heyoka", "scipy", ADAMS)
@@ -43,7 +42,7 @@ def choose(problem: Problem) -> tuple[str, str]:
     It looks at eigenvalues at a few states (milliseconds), so keep the answer where many similar problems are solved.
     """
     if problem.straight is not None:
-        from shaftwork.integrate.linear.propagation import cost
+        from shaftwork.integrate.linear.propagation import LONGEST_EXACT, cost
 
         seconds = cost(problem, problem.straight)
         longest = LONGEST_EXACT_CHAIN if seconds > LONGEST_EXACT_CHAIN and _is_damped_chain(problem) else LONGEST_EXACT
@@ -73,7 +72,7 @@ def is_stiff(problem: Problem) -> bool:
 
 def patience(problem: Problem) -> int:
     """Steps of heyoka that cost as much as a transient of an implicit engine: a stiff phase may be over by then."""
-    return int(TRANSIENT_STEPS * CVODE_STEP / (HEYOKA_STEP_PER_STATE * problem.x0.size))
+    return int(TRANSIENT_STEPS * STEP["sundials"] / (STEP["heyoka"] * problem.x0.size))
 
 
 def solve(
@@ -99,42 +98,59 @@ def solve(
     if name != "heyoka" or not (fallback or engine == "auto"):
         trajectory = _guarded(problem, load(name)(problem), name)
         return trajectory, name, f"{why or reason} {trajectory.remark}".rstrip()
+
+    def run(other: str, steps: int, because: str) -> tuple[Trajectory, str, str]:
+        return _guarded(problem, load(other)(changed(problem, max_steps=steps)), other), other, because
+
     try:
-        return _guarded(problem, load(name)(problem), name), name, why or reason
+        return run(name, problem.max_steps, why or reason)
     except SeriesError as error:
-        if isinstance(error, StickingError) and error.driven_back:
-            raise
         failed = error
-        *tried, (last, _) = without_series(problem.max_steps)
-    for other, steps in tried:
-        with suppress(SimulationError):
-            trajectory = _guarded(problem, load(other)(replace(problem, max_steps=steps)), other)
-            return trajectory, other, no_series(failed, other)
-    if tried and isinstance(failed, StickingError):
+    return without_series(run, failed, problem.max_steps)
+
+
+def without_series(run: Callable[[str, int, str], Run], failed: SeriesError, most: int) -> Run:
+    """A run with other engines, tried one after another, where heyoka cannot go on.
+
+    Args:
+        run: makes it with an engine by name, so many steps at most, for a reason.
+        failed: why heyoka cannot.
+        most: steps.
+
+    Raises:
+        SimulationError: no engine goes on; of a motion that sticks where a law jumps heyoka says why.
+    """
+    if is_driven_back(failed):
         raise failed
-    return _guarded(problem, load(last)(problem), last), last, no_series(failed, last)
+    implicit = ENGINES["sundials"].installed  # looked at only now: it takes a while to tell
+    # 5000 steps of scipy take some seconds. A motion that comes to rest where a law has an infinite slope, as that of a
+    # square root of the speed does, is infinitely stiff there, and an explicit method would need a million.
+    ladder = [("scipy", min(most, 5000)), ("sundials", most)] if implicit else []
+    for name, steps in ladder:
+        with suppress(SimulationError):
+            return run(name, steps, NO_SERIES.format(failed.obstacle, IN_WORDS[name]))
+    if implicit and isinstance(failed, StickingError):
+        raise failed
+    return run("scipy", most, NO_SERIES.format(failed.obstacle, IN_WORDS["scipy"]))
 
 
-def without_series(most: int) -> list[tuple[str, int]]:
-    """The engines that are tried one after another where heyoka cannot go on: name and most steps."""
-    if not ENGINES["sundials"].installed:
-        return [("scipy", most)]
-    return [("scipy", min(most, LONG_FOR_SCIPY)), ("sundials", most), ("scipy", most)]
-
-
-def no_series(failed: SeriesError, name: str) -> str:
-    """Why another engine is taken where heyoka cannot go on."""
-    return NO_SERIES.format(failed.obstacle, IN_WORDS[name])
+def is_driven_back(failed: SimulationError) -> bool:
+    """Whether a motion sticks where a law jumps, driven back there from both sides: no engine goes on."""
+    return isinstance(failed, StickingError) and failed.driven_back
 
 
 def _guarded(problem: Problem, trajectory: Trajectory, name: str) -> Trajectory:
     """The run, with what makes it worth less than it should be."""
-    from shaftwork.integrate.linear.rounding_errors import spoiled
-    from shaftwork.integrate.linear.verification import objection
+    if not trajectory.t.size or (problem.observed is None and name in EXPLICIT):
+        return trajectory
+    if problem.observed is None:
+        from shaftwork.integrate.linear.rounding_errors import spoiled
 
-    said = objection(problem, trajectory, name)
-    if said is None and problem.observed is None and name not in EXPLICIT and trajectory.t.size:
         said = spoiled(problem, trajectory.t, trajectory.x)
+    else:
+        from shaftwork.integrate.linear.verification import objection
+
+        said = objection(problem, problem.observed, trajectory, name)
     return replace(trajectory, caveat=said) if said else trajectory
 
 
@@ -161,15 +177,27 @@ def load(name: str) -> Engine:
     entry = INNER.get(name) or ENGINES[name]
     if not entry.installed:
         raise MissingExtraError(entry.distribution, entry.extra, f"engine={name!r}")
-    module, function = entry.function.split(":")
-    run = getattr(importlib.import_module(module), function)
-    options = dict(entry.options)
+    match name:
+        case "exact":
+            from shaftwork.integrate.linear import propagation
 
-    def engine(problem: Problem) -> Trajectory:
-        trajectory: Trajectory = run(problem, **options)
-        return trajectory
+            return propagation.solve
+        case "heyoka":
+            from shaftwork.integrate.taylor import heyoka_taylor
 
-    return engine
+            return heyoka_taylor.solve
+        case "sundials" | "sundials-adams":
+            from shaftwork.integrate import sundials
+
+            return partial(sundials.solve, method="BDF" if name == "sundials" else "Adams")
+        case "banded":
+            from shaftwork.integrate.collocation import banded
+
+            return banded.solve
+        case _:
+            from shaftwork.integrate import scipy_ivp
+
+            return partial(scipy_ivp.solve, method="DOP853" if name == "scipy" else "Radau")
 
 
 def _stiff(problem: Problem, *, compiled: bool) -> tuple[str, str] | None:
@@ -178,8 +206,7 @@ def _stiff(problem: Problem, *, compiled: bool) -> tuple[str, str] | None:
 
     matrices, duration = [*jacobians(problem)], problem.t_end - problem.t0
     name = "sundials" if ENGINES["sundials"].installed else "scipy-radau"
-    explicit_step = HEYOKA_STEP_PER_STATE * problem.x0.size if compiled else DOP853_STEP
-    implicit_step = CVODE_STEP if name == "sundials" else RADAU_STEP
+    explicit_step, implicit_step = STEP["heyoka"] * problem.x0.size if compiled else STEP["scipy"], STEP[name]
     most = bound_of_decay(matrices) * duration / STABLE
     if problem.x0.size <= LARGEST_NOT_BANDED and most * explicit_step <= TRANSIENT_STEPS * implicit_step:
         return None

@@ -16,15 +16,9 @@ Dense = Callable[[Array], Array]
 
 # Where in a step the switches are looked at before `LOOKS`.
 FIRST = np.array([0.47])
-# More than the first look is not needed where all switches are so many times as far from zero as they move in a step.
-FAR = 2.0
-# A switch that comes near to zero between the looks is followed to its least value so many times.
-FOLLOWED = 3
 # A step ends past its switch, by so much that no state moves there by more than this part of its tolerance. One that
 # ends past it by less than the second part stands.
 PAST, BEARABLE = 0.01, 0.04
-# After so many attempts to end a step at its switch the step is halved.
-ATTEMPTS = 4
 # A motion that passes the same switch so many times in a row within its tolerance rests there, until it leaves it by
 # some tolerances.
 RESTING, LEFT = 50, 10.0
@@ -122,10 +116,10 @@ class Crossings:
             return float(np.min(self._scale(look.states[row]) / rates, initial=np.inf))
 
     def _settled(self, start: float, end: float, time: float) -> float:
-        """The time at which a step is to end, halved where attempts to find it do not converge."""
+        """The time at which a step is to end, halved where four attempts to find it do not converge."""
         self._attempts = self._attempts + 1 if start == self._start else 1
         self._start = start
-        return time if self._attempts <= ATTEMPTS else min(time, start + (end - start) / 2)
+        return time if self._attempts <= 4 else min(time, start + (end - start) / 2)
 
     def _watched(self, values: Array, band: Array) -> NDArray[np.bool_]:
         """The switches (m,) at which the motion does not rest; step control alone sees the others."""
@@ -171,17 +165,17 @@ class Look:
         return self._switches(times, self._dense(times))
 
     def is_far(self) -> bool:
-        """Whether all switches are far from zero for what they move."""
+        """Whether all switches are twice as far from zero as they move in the step: then one look is enough."""
         low, high = self.values.min(axis=0), self.values.max(axis=0)
-        return bool((np.minimum(np.abs(low), np.abs(high)) > FAR * (high - low)).all())
+        return bool((np.minimum(np.abs(low), np.abs(high)) > 2 * (high - low)).all())
 
     def follow(self, *, every: bool = False) -> bool:
-        """Whether a switch leaves its side; where one comes near to zero between the times, they are made denser.
+        """Whether a switch leaves its side; where one comes near to zero between the times, three more are looked at.
 
         Args:
             every: follow the others too where one has left: they may have left before.
         """
-        for _ in range(FOLLOWED):
+        for _ in range(3):
             if self._left().any() and not every:
                 return True
             if not self._denser():

@@ -1,4 +1,4 @@
-"""The engines by name: where each lives, what it needs and how fine a tolerance it keeps."""
+"""The engines by name: what each needs and how fine a tolerance it keeps; `choice.load` says where each is."""
 
 from __future__ import annotations
 
@@ -15,28 +15,24 @@ ENGINE_NAMES: tuple[EngineName, ...] = get_args(EngineName)
 
 @dataclass(frozen=True)
 class EngineEntry:
-    """Where an engine lives.
+    """What an engine needs and keeps.
 
     Args:
-        function: "module:function".
-        purpose: what it is for, half a sentence.
         library: module it needs beyond numpy and scipy, or None.
         distribution: name of that library for pip.
         extra: the extra that brings it.
-        options: keyword arguments of the function.
         finest: relative tolerance below which it takes none; 0 where it has no step error.
+        loosest: the one above which it takes none.
         following: of an engine that follows guards, the part of the tolerance that it then runs with, and the loosest
             one: an error grows with every change of mode, by some hundreds through sixty contacts.
         absolute: whether it has an absolute tolerance.
     """
 
-    function: str
-    purpose: str
     library: str | None = None
     distribution: str = ""
     extra: str = ""
-    options: tuple[tuple[str, str], ...] = ()
     finest: float = 0.0
+    loosest: float = 1.0
     following: tuple[float, float] | None = None
     absolute: bool = True
 
@@ -48,48 +44,33 @@ class EngineEntry:
 
 # Below these tolerances scipy's methods only warn, SUNDIALS refuses (near the rounding of numbers), the rounding in the
 # stage equations of the banded engine is larger, and so is that of coefficients of rounded numbers on a wave.
-_SCIPY = EngineEntry(
-    "shaftwork.integrate.scipy_ivp:solve", "everything that is not stiff", finest=100 * EPS, following=(1 / 30, 1e-7)
-)
+_SCIPY = EngineEntry(finest=100 * EPS, following=(1 / 30, 1e-7))
 WAVE = EngineEntry(
-    "shaftwork.waves.delay_engine.engine:solve",
-    "travelling waves",
     finest=1e-12,
     following=(1.0, 1e-6),  # its panels leave out a tenth of the tolerance
     absolute=False,
 )
-"""The engine of networks with waves, which no others can take."""
+"""The engine of networks with waves, which no others can take: it is in their room, and they load it."""
 
 ENGINES: dict[str, EngineEntry] = {
-    "exact": EngineEntry(
-        "shaftwork.integrate.linear.propagation:solve", "linear systems, without a step error", absolute=False
-    ),
+    "exact": EngineEntry(absolute=False),
     "heyoka": EngineEntry(
-        "shaftwork.integrate.taylor.heyoka_taylor:solve",
-        "smooth and piecewise laws, compiled",
         "heyoka",
         "heyoka",
         "fast",
         finest=1e-15,
-        following=(1.0, 1e-12),  # the cost grows only with the logarithm
+        loosest=1e-10,  # the cost grows only with the logarithm, and a loose one loses events
+        following=(1.0, 1e-12),
     ),
-    "sundials": EngineEntry(
-        "shaftwork.integrate.sundials:solve",
-        "stiff systems",
-        "sksundae",
-        "scikit-sundae",
-        "stiff",
-        finest=8 * EPS,
-        following=(1 / 300, 1e-8),
-    ),
+    "sundials": EngineEntry("sksundae", "scikit-sundae", "stiff", finest=8 * EPS, following=(1 / 300, 1e-8)),
     "scipy": _SCIPY,
-    "scipy-radau": replace(_SCIPY, purpose="stiff systems", options=(("method", "Radau"),)),
-    "banded": EngineEntry("shaftwork.integrate.collocation.banded:solve", "long chains, linear or stiff", finest=1e-11),
+    "scipy-radau": _SCIPY,
+    "banded": EngineEntry(finest=1e-11),
 }
 
 # Another method of an engine, which a run chooses by itself.
 ADAMS = "sundials-adams"
-INNER = {ADAMS: replace(ENGINES["sundials"], options=(("method", "Adams"),), following=(1 / 100, 1e-8))}
+INNER = {ADAMS: replace(ENGINES["sundials"], following=(1 / 100, 1e-8))}
 
 
 def available(name: str) -> bool:

@@ -12,15 +12,11 @@ from shaftwork.numerics.polynomials import Interpolant, interpolation_times
 from shaftwork.numerics.tolerances import CLEARANCE
 from shaftwork.numerics.zeros import LOOKS, zero
 
-# What the tolerance moves a guard, as part of its course in a run of a few steps, may be no more.
-KNOWN, BRIEF = 1e-5, 100
+# A run of more steps tells enough of a motion by itself.
+BRIEF = 100
 
 # A step that meets a guard is looked at in panels that are halved towards it, so many times; Gauss' nodes in each.
 PANELS, (NODES, WEIGHTS) = 14, np.polynomial.legendre.leggauss(4)
-# One that does not is made again in so many steps, unless it is shorter than this part of the whole run.
-SHORTER, LEAST = 8, 1e-9
-# Degree of the polynomial of a guard between two looks, and how many rounding units beside its zero it is checked.
-DEGREE, BESIDE = 12, 8
 
 
 class GuardWatch:
@@ -150,10 +146,10 @@ class GuardWatch:
         polynomial through their values at some times, where their values beside it agree.
         """
         low, high, ulp = float(look.times[before]), float(look.times[row]), float(np.spacing(look.times[-1]))
-        times = np.minimum(interpolation_times(low, high, DEGREE), high)
+        times = np.minimum(interpolation_times(low, high, degree=12), high)
         course = Interpolant(low, high, look.at(times)[:, [column]])
         root = _zero(lambda t: course(t)[:, 0], low, high, ulp)
-        beside = look.at(root + BESIDE * ulp * np.array([-1.0, 1.0]))[:, column]
+        beside = look.at(root + 8 * ulp * np.array([-1.0, 1.0]))[:, column]
         if root == high or beside[0] < 0 < beside[1]:
             return root
         return _zero(lambda t: look.at(t)[:, column], low, high, ulp)
@@ -166,7 +162,7 @@ def _zero(value: Callable[[Array], Array], low: float, high: float, ulp: float) 
 
 
 def share_of_tolerance(problem: Problem | DaeProblem, times: Array, states: Array) -> float:
-    """The part of its tolerance with which a brief run knows the courses of all guards; 1 where it does now.
+    """The part of its tolerance with which a brief run knows the courses of all guards to 1e-5; 1 where it does now.
 
     Args:
         problem: what was solved.
@@ -180,4 +176,4 @@ def share_of_tolerance(problem: Problem | DaeProblem, times: Array, states: Arra
     values = guards.values(np.append(times, times[-1]), np.vstack([states, moved]))
     bands, courses = np.abs(values[-1] - values[-2]), np.abs(values[:-1]).max(axis=0)
     goes = (guards.sides != 0) & (courses > 0) & (bands > 0)
-    return float(np.min(KNOWN * courses[goes] / bands[goes], initial=1.0))
+    return float(np.min(1e-5 * courses[goes] / bands[goes], initial=1.0))

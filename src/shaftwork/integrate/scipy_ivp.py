@@ -2,31 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any, Literal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from scipy.integrate import DOP853, OdeSolution, Radau
 
 from shaftwork.core.errors import SimulationError
-from shaftwork.integrate.crossings import Crossings
 from shaftwork.integrate.engines import ENGINES
-from shaftwork.integrate.guards import LEAST, SHORTER, GuardWatch
+from shaftwork.integrate.guards import BRIEF
 from shaftwork.integrate.linear.rounding_errors import cancellation
 from shaftwork.integrate.problem import Array, Problem, Trajectory, tightened
-from shaftwork.integrate.smooth_intervals import (
-    GuardedFunctions,
-    Pace,
-    PiecewiseDense,
-    SmoothInterval,
-    both_sides,
-    failure,
-    pieces,
-    reached,
-    start_of_piece,
-    used_up,
-)
+from shaftwork.integrate.smooth_intervals import GuardedFunctions, PiecewiseDense, SmoothInterval, failure, reached
+from shaftwork.integrate.stepping import Step, SteppedRun, march
 from shaftwork.integrate.stiffness import STABLE, bound_of_decay, jacobians, rates
 
 Method = Literal["DOP853", "Radau"]
@@ -35,23 +24,8 @@ METHODS: dict[str, Any] = {"DOP853": DOP853, "Radau": Radau}
 
 FINEST = ENGINES["scipy"].finest
 
-# A run is made again where the torques of dampers may be off by more than the first factor times the tolerance. On the
-# edge of stability errors are some 50 times as large as the tolerance that is asked for, hence the second.
-BEARABLE, EDGE = 2.0, 50.0
-# With steps of a smaller product of length and decay rate it is far from that edge, and every fast motion has steps of
-# its own.
-INSIDE, BRIEF = 1.0, 100
-
-
-@dataclass(frozen=True)
-class _SolvedInterval:
-    """One piece, solved: step ends (s,), states there (s, n), dense output, counts, and the guard that ended it."""
-
-    times: Array
-    states: Array
-    dense: Callable[[Array], Array]
-    counts: dict[str, int]
-    met: int | None = None
+# A run is made again where the torques of dampers may be off by more than this factor times the tolerance.
+BEARABLE = 2.0
 
 
 def solve(problem: Problem, method: Method = "DOP853") -> Trajectory:
@@ -69,145 +43,150 @@ def solve(problem: Problem, method: Method = "DOP853") -> Trajectory:
 
     Source: scipy.integrate; Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I (DOP853) and II (Radau).
     """
-    runs = _march(problem, method)
-    if method == "DOP853" and (problem.guards is None or _on_edge(problem, runs)):
+    run = _run(problem, method)
+    if method == "DOP853" and (problem.guards is None or _on_edge(problem, run.march.steps)):
         # On the edge of its stability it leaves errors of the tolerance in what an implicit method damps.
-        times, states = _samples(runs)
+        times, states = _starts(run.march)
         few = slice(None) if problem.guards is None else [0, -1]  # of many short runs, each tells a little
         factor = cancellation(problem, times[few], states[few])
         if BEARABLE < factor < 1 / np.finfo(float).eps:  # it is beyond all bounds where nothing has moved yet
-            share = max(1 / (EDGE * factor), FINEST / problem.rtol)
-            tight = tightened(problem, share)
+            # On the edge of stability errors are some 50 times as large as the tolerance that is asked for.
+            share = max(1 / (50 * factor), FINEST / problem.rtol)
             decay = rates(jacobians(problem)).decay
             # A longer step than is stable may well end right, because what is left of the fast motion is tiny at its
             # start, and yet be off inside by much more than the torque of a damper bears.
-            again = _march(tight, method, longest=STABLE / decay if decay > 0 else np.inf)
-            runs = [replace(new, counts=_sums([new, old])) for new, old in zip(again, runs, strict=True)]
-    starts = np.array([run.times[0] for run in runs])
-    steps = np.concatenate([runs[0].times, *(run.times[1:] for run in runs[1:])])
-    dense = PiecewiseDense(starts, tuple(run.dense for run in runs), steps, problem.x0.size)
+            again = _run(tightened(problem, share), method, longest=STABLE / decay if decay > 0 else np.inf)
+            run = _Run(again.march, again.dense, {name: run.counts[name] + again.counts[name] for name in run.counts})
+    whole, dense = run.march, run.dense
     if problem.t_eval is None:
-        t, states = both_sides(problem, [run.times for run in runs], [run.states for run in runs])
+        t, states = whole.both_sides(problem)
     else:
-        t = reached(problem.t_eval, steps[-1])
+        t = reached(problem.t_eval, whole.end[0])
         states = dense(t)
-    return Trajectory(t, states, dense, _sums(runs), met=runs[-1].met, end=(float(steps[-1]), runs[-1].states[-1]))
+    return Trajectory(t, states, dense, run.counts, met=whole.met, end=whole.end)
 
 
-def _march(problem: Problem, method: Method, longest: float = np.inf) -> list[_SolvedInterval]:
-    """All pieces, one after another."""
-    x, pace, taken = np.asarray(problem.x0, dtype=float), Pace(problem), 0
-    runs: list[_SolvedInterval] = []
+class _Run(NamedTuple):
+    """All steps, dense output and counts by name."""
+
+    march: SteppedRun
+    dense: PiecewiseDense
+    counts: dict[str, int]
+
+
+def _run(problem: Problem, method: Method, longest: float = np.inf) -> _Run:
+    """A run in steps of at most `longest` s."""
+    stepper = _ScipyStepper(problem, method, longest)
     with np.errstate(all="ignore"):
-        for piece in pieces(problem):
-            start = start_of_piece(problem, piece, x)
-            run = _piece(problem, piece, start, method, problem.max_steps - taken, pace, longest)
-            runs.append(run)
-            x, taken = run.states[-1], taken + run.counts["steps"]
-            if run.met is not None:
-                break
-    return runs
+        whole = march(problem, stepper)
+    solutions = [
+        _rows(OdeSolution(piece.times, parts)) for piece, parts in zip(whole.pieces, stepper.parts, strict=True)
+    ]
+    starts = np.array([piece.times[0] for piece in whole.pieces])
+    dense = PiecewiseDense(starts, tuple(solutions), whole.steps, problem.x0.size)
+    counts = {"steps": whole.steps.size - 1, **dict(zip(("rhs", "jacobians"), stepper.calls, strict=True))}
+    return _Run(whole, dense, counts)
 
 
-def _on_edge(problem: Problem, runs: list[_SolvedInterval]) -> bool:
-    """Whether a step is so long that it may be stability which bounds it.
+def _on_edge(problem: Problem, steps: Array) -> bool:
+    """Whether one of the steps, by their ends (s,), is so long that it may be stability which bounds it.
 
-    The decay is looked at once for many brief phases in the same modes, and anew for a long one.
+    With a product of length and decay rate below 1 it is far from that, and every fast motion has steps of its own. The
+    decay is looked at once for many brief phases in the same modes, and anew for a long one.
     """
-    longest, estimates = max(float(np.diff(run.times).max()) for run in runs), problem.estimates
-    long = sum(run.counts["steps"] for run in runs) > BRIEF
+    longest, estimates = float(np.diff(steps).max()), problem.estimates
+    long = steps.size - 1 > BRIEF
     if long or "decay" not in estimates:
         if long or "bound" not in estimates:
             estimates["bound"] = bound_of_decay(jacobians(problem))
-        if longest * estimates["bound"] <= INSIDE:
+        if longest * estimates["bound"] <= 1:
             return False
         estimates["decay"] = rates(jacobians(problem)).decay
-    return bool(longest * estimates["decay"] > INSIDE)
+    return bool(longest * estimates["decay"] > 1)
 
 
-def _samples(runs: list[_SolvedInterval]) -> tuple[Array, Array]:
+def _starts(whole: SteppedRun) -> tuple[Array, Array]:
     """Times and states at the starts of all steps: there no input is in the midst of a jump."""
-    return np.concatenate([run.times[:-1] for run in runs]), np.concatenate([run.states[:-1] for run in runs])
+    times = [time for piece in whole.pieces for time in piece.times[:-1]]
+    return np.array(times), np.array([state for piece in whole.pieces for state in piece.states[:-1]])
 
 
-def _sums(runs: list[_SolvedInterval]) -> dict[str, int]:
-    return {name: sum(run.counts[name] for run in runs) for name in runs[0].counts}
+class _ScipyStepper:
+    """One of scipy's methods.
 
-
-def _piece(
-    problem: Problem, piece: SmoothInterval, x: Array, method: Method, max_steps: int, pace: Pace, longest: float
-) -> _SolvedInterval:
-    guard, crossings = GuardedFunctions(problem, piece), Crossings(problem, piece)
-    watch = GuardWatch(problem, piece.low, piece.high)
-    times, states = [piece.start], [x]
-    interpolants: list[Any] = []
-    retired, shortest = np.zeros(2, dtype=int), LEAST * (problem.t_end - problem.t0)
-    try:
-        solver = _solver(problem, piece, x, method, guard, longest)
-        while times[-1] < piece.end:
-            if len(interpolants) >= max_steps:
-                raise failure(problem, "scipy", solver.t, solver.y, used_up(problem))
-            _advance(problem, solver, method, guard, times[-1], states[-1])
-            if (objection := pace.objection(solver.t, rests=crossings.rests)) is not None:
-                raise failure(problem, "scipy", solver.t, solver.y, f"{method}: {objection}")
-            dense = solver.dense_output()
-            end = watch.cut(times[-1], states[-1], solver.t, solver.y, _rows(dense))
-            cut = crossings.cut(times[-1], states[-1], solver.t, solver.y, _rows(dense))
-            if end is not None and (cut is None or end <= cut):
-                if not watch.follows(times[-1], states[-1], end, _rows(dense)) and solver.t - times[-1] > shortest:
-                    retired += solver.nfev, solver.njev
-                    rest, brief = replace(piece, start=times[-1]), (solver.t - times[-1]) / SHORTER
-                    solver = _solver(problem, rest, states[-1], method, guard, brief)
-                    continue
-                interpolants.append(dense)
-                times.append(end)
-                states.append(np.asarray(dense(end)))
-                break
-            if cut is None or cut == solver.t:
-                interpolants.append(dense)
-                times.append(solver.t)
-                states.append(solver.y)
-            if cut is not None or solver.status == "finished":
-                retired += solver.nfev, solver.njev
-            if times[-1] < piece.end and (cut is not None or solver.status == "finished"):
-                end = piece.end if cut is None or cut == solver.t else cut
-                solver = _solver(problem, replace(piece, start=times[-1], end=end), states[-1], method, guard, longest)
-    except SimulationError:
-        raise
-    except (ValueError, RuntimeError) as error:  # a factorisation that met a NaN, or a singular one
-        raise failure(problem, "scipy", times[-1], states[-1], f"{method}: {error}", guard) from error
-    solution = OdeSolution(times, interpolants)
-    calls, jacobians = retired.tolist()
-    counts = {"steps": len(interpolants), "rhs": calls, "jacobians": jacobians}
-    met = watch.met if times[-1] < piece.end else None
-    return _SolvedInterval(np.array(times), np.array(states), _rows(solution), counts, met)
-
-
-def _advance(problem: Problem, solver: Any, method: Method, guard: GuardedFunctions, t: float, x: Array) -> None:
-    """Take one step from a time in s and a state (n,).
-
-    Raises:
-        SimulationError: it failed; says when and why.
+    Args:
+        problem: what is being solved.
+        method: its name.
+        longest: a step at most, s.
     """
-    if np.isnan(getattr(solver, "h_abs", 0.0)):  # scipy would look for a first step without end
-        raise failure(problem, "scipy", t, x, f"{method}: no first step was found", guard)
-    reason = str(solver.step() or "")
-    if solver.status == "failed":
-        good = x if np.isfinite(x).all() else solver.y
-        raise failure(problem, "scipy", t, good, f"{method}: {reason}", guard)
-    if not np.isfinite(solver.y.sum()):
-        raise failure(problem, "scipy", solver.t, solver.y, f"{method}: the state is not finite", guard)
+
+    engine = "scipy"
+    cuts_off = False
+
+    def __init__(self, problem: Problem, method: Method, longest: float) -> None:
+        self._problem, self._method, self._longest = problem, method, longest
+        self._solver: Any = None
+        self._calls = (0, 0)
+        self.parts: list[list[Any]] = []
+        """Of each piece, the dense output of its steps."""
+
+    @property
+    def calls(self) -> tuple[int, int]:
+        """How often right-hand side and Jacobian were evaluated."""
+        return self._calls[0] + self._solver.nfev, self._calls[1] + self._solver.njev
+
+    def open(self, piece: SmoothInterval, t: float, x: Array) -> Array:
+        if t == piece.start:
+            self._piece, self._functions = piece, GuardedFunctions(self._problem, piece)
+            self.parts.append([])
+        self._begin(t, x, piece.end, self._longest)
+        return x
+
+    def step(self, t: float, x: Array) -> Step:
+        if self._solver.status == "finished":  # up to a switch
+            self._begin(t, x, self._piece.end, self._longest)
+        solver = self._solver
+        if np.isnan(getattr(solver, "h_abs", 0.0)):  # scipy would look for a first step without end
+            raise self._failure(t, x, "no first step was found")
+        with self._told(t, x):
+            reason = str(solver.step() or "")
+        if solver.status == "failed":
+            raise self._failure(t, x if np.isfinite(x).all() else solver.y, reason)
+        if not np.isfinite(solver.y.sum()):
+            raise self._failure(solver.t, solver.y, "the state is not finite")
+        self._dense = solver.dense_output()
+        return Step(solver.t, solver.y, _rows(self._dense))
+
+    def again(self, t: float, x: Array, end: float, longest: float) -> None:
+        self._begin(t, x, end, min(longest, self._longest))
+
+    def take(self, t: float, end: float, state: Array) -> None:  # noqa: ARG002 (its dense output has all)
+        self.parts[-1].append(self._dense)
+
+    def _begin(self, t: float, x: Array, end: float, longest: float) -> None:
+        if self._solver is not None:
+            self._calls = self.calls
+        problem, functions = self._problem, self._functions
+        options: dict[str, Any] = {"rtol": max(problem.rtol, FINEST), "atol": problem.atol, "max_step": longest}
+        if self._method != "DOP853" and problem.jacobian is not None:
+            options["jac"] = functions.jacobian
+        with self._told(t, x):
+            self._solver = METHODS[self._method](functions.rhs, t, x, end, **options)
+
+    @contextmanager
+    def _told(self, t: float, x: Array) -> Iterator[None]:
+        """Tell of a factorisation that met a NaN, or of a singular one, where and when it was."""
+        try:
+            yield
+        except SimulationError:
+            raise
+        except (ValueError, RuntimeError) as error:
+            raise self._failure(t, x, str(error)) from error
+
+    def _failure(self, t: float, x: Array, reason: str) -> SimulationError:
+        return failure(self._problem, "scipy", t, x, f"{self._method}: {reason}", self._functions)
 
 
 def _rows(dense: Callable[[Array], Array]) -> Callable[[Array], Array]:
     """Dense output with a row for each time, where scipy's has a column."""
     return lambda times: np.asarray(dense(times)).T
-
-
-def _solver(
-    problem: Problem, piece: SmoothInterval, x: Array, method: Method, guard: GuardedFunctions, longest: float
-) -> Any:
-    options: dict[str, Any] = {"rtol": max(problem.rtol, FINEST), "atol": problem.atol, "max_step": longest}
-    if method != "DOP853" and problem.jacobian is not None:
-        options["jac"] = guard.jacobian
-    return METHODS[method](guard.rhs, piece.start, x, piece.end, **options)

@@ -12,11 +12,6 @@ import numpy as np
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.problem import Array, DaeProblem, Problem, TimedProblem
 
-# A run has stalled when so many steps together advance by less than so many times this part of the whole time.
-STALL_STEPS, STALL_SPAN = 2000, 1e-10
-# Where the motion rests at a switch of a law, this part is enough: ten million such steps would make a run. Where a law
-# is as the square root of the speed, such a run would not end otherwise.
-STUCK_SPAN = 1e-7
 # Where a run has failed its further course is looked at for laws without a value, over this part of the whole time.
 AHEAD = 1e-6 * 0.5 ** np.arange(30, -1, -1)
 T = TypeVar("T")
@@ -211,39 +206,6 @@ def _near(problem: TimedProblem, explain: Callable[[Array, Array], T] | None, t:
 def used_up(problem: Problem | DaeProblem) -> str:
     """Why a run is given up that needs more steps than are allowed."""
     return f"{problem.earlier_steps + problem.max_steps} steps were not enough"
-
-
-class Pace:
-    """Tells a run that goes on, in ever shorter steps, from one that has stalled; and whoever asks, how far it is.
-
-    Args:
-        problem: what is being solved.
-    """
-
-    def __init__(self, problem: TimedProblem) -> None:
-        self._progress, self._duration = problem.progress, problem.t_end - problem.t0
-        self._since, self._steps = problem.t0, 0
-
-    def objection(self, t: float, *, rests: bool = False) -> str | None:
-        """After each step to a time t in s: the reason to give up, or None.
-
-        Args:
-            t: end of the step, s.
-            rests: whether the motion rests at a switch of a law.
-        """
-        if self._progress is not None:
-            self._progress(t)
-        self._steps += 1
-        if self._steps % STALL_STEPS:
-            return None
-        advance, self._since = t - self._since, t
-        if advance >= STALL_STEPS * (STUCK_SPAN if rests else STALL_SPAN) * self._duration:
-            return None
-        return (
-            f"the last {STALL_STEPS} steps advanced by {advance:.2g} s only, as where the laws on both sides of a jump "
-            "drive the motion back to it. Give such a law a smooth transition, tanh(omega / 0.01) in place of "
-            "sign(omega)"
-        )
 
 
 def check_finite(problem: TimedProblem, engine: str, t: float, x: Array) -> None:

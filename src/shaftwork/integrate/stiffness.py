@@ -15,8 +15,6 @@ from shaftwork.integrate.smooth_intervals import pieces
 
 # Up to here all eigenvalues are computed; beyond, norms of the balanced Jacobian bound them.
 LARGEST_EIGENVALUES = 200
-# A few starts of pieces are looked at, not all: every piece of a pulsed input looks alike.
-MOST_PIECES = 4
 # Explicit methods are stable up to about this product of step and decay rate.
 STABLE = 5.0
 
@@ -53,7 +51,7 @@ def jacobians(problem: Problem) -> Iterator[Any]:
 def _jacobians(problem: Problem) -> Iterator[Any]:
     if problem.jacobian is None:
         return
-    for piece in pieces(problem)[:MOST_PIECES]:
+    for piece in pieces(problem)[:4]:  # not all of them: every piece of a pulsed input looks alike
         time = piece.inside(piece.start)
         matrix = sparse.csc_array(problem.jacobian(time, problem.x0))
         yield matrix

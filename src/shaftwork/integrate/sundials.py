@@ -6,26 +6,17 @@ import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import islice, pairwise
 from typing import Literal
 
 import numpy as np
 
 from shaftwork.core.calls import unprinted
 from shaftwork.core.errors import MissingExtraError
-from shaftwork.integrate.crossings import Crossings
-from shaftwork.integrate.guards import LEAST, SHORTER, GuardWatch, share_of_tolerance
+from shaftwork.integrate.guards import share_of_tolerance
 from shaftwork.integrate.problem import Array, DaeProblem, Problem, Trajectory, tightened
-from shaftwork.integrate.smooth_intervals import (
-    Pace,
-    PiecewiseDense,
-    SmoothInterval,
-    both_sides,
-    check_finite,
-    failure,
-    pieces,
-    start_of_piece,
-    used_up,
-)
+from shaftwork.integrate.smooth_intervals import PiecewiseDense, SmoothInterval, check_finite, failure
+from shaftwork.integrate.stepping import Step, SteppedRun, march
 from shaftwork.integrate.sundials_solvers import (
     DEGREES,
     JacobianPattern,
@@ -37,11 +28,8 @@ from shaftwork.integrate.sundials_solvers import (
 )
 from shaftwork.numerics.polynomials import Interpolant, interpolation_times
 
-# A run up to a guard is made again where this part of its tolerance would not do, and where it is not as tight already:
-# absolute tolerances of small twists may be that tight.
-ENOUGH, TIGHTEST_ATOL = 0.5, 1e-17
-# Of a run with output times so many numbers at the ends of its steps are kept.
-MOST_KEPT = 1_000_000
+# No tolerance is made tighter: absolute ones of small twists may be that tight.
+TIGHTEST_ATOL = 1e-17
 
 
 Opener = Callable[[SmoothInterval, Array], OpenedSolver]
@@ -96,41 +84,19 @@ def _require(purpose: str) -> None:
         raise MissingExtraError("scikit-sundae", "stiff", purpose)
 
 
-@dataclass(frozen=True)
-class _CvodeStep:
-    """One step: its ends in s, the state (n,) at its end, the states (k, n) at the times asked for inside it."""
-
-    start: float
-    end: float
-    state: Array
-    inside: Array
-
-
-@dataclass(frozen=True)
-class _MarchedPiece:
-    """The steps of one smooth piece, and the state (n,) with which it starts."""
-
-    start: Array
-    steps: list[_CvodeStep]
-
-    @property
-    def times(self) -> Array:
-        """(s + 1,) ends of the steps, s."""
-        return np.array([self.steps[0].start, *(step.end for step in self.steps)])
-
-    @property
-    def states(self) -> Array:
-        """(s + 1, n) states there."""
-        return np.vstack([self.start, *(step.state for step in self.steps)])
-
-
 InnerTimes = Callable[[float, float], Array]
-"""The times (k,) wanted in a step, from its start and end in s."""
-Marched = tuple[list[_MarchedPiece], int | None]
-"""All pieces, and the guard that ended the run."""
+"""The times (k,) wanted in a step after its start, from its start and end in s."""
 
 
-def _march(problem: Problem | DaeProblem, opening: Opening, inner: InnerTimes) -> Marched:
+@dataclass(frozen=True)
+class _Marched:
+    """A run: its steps, and of each the states (k, n) that were wanted in it."""
+
+    march: SteppedRun
+    inside: list[Array]
+
+
+def _run(problem: Problem | DaeProblem, opening: Opening, inner: InnerTimes) -> _Marched:
     """All steps up to a guard; where they are few, they are made again with the tolerance that its course needs.
 
     Rebounds become ever shorter. After each a method starts with low order, and errs by its tolerance however short
@@ -139,87 +105,80 @@ def _march(problem: Problem | DaeProblem, opening: Opening, inner: InnerTimes) -
     share = 1.0
     while True:
         tight = tightened(problem, share)
-        marched, met = _attempt(tight, opening(share), inner)
-        if met is None or tight.rtol <= TIGHTEST_ATOL:
-            return marched, met
-        first, *others = marched
-        times = np.concatenate([first.times, *(piece.times[1:] for piece in others)])
-        states = np.concatenate([first.states, *(piece.states[1:] for piece in others)])
-        if (part := share_of_tolerance(tight, times, states)) > ENOUGH:
-            return marched, met
+        stepper = _SundialsStepper(tight, opening(share), inner)
+        with np.errstate(all="ignore"):
+            marched = _Marched(march(tight, stepper), stepper.inside)
+        if marched.march.met is None or tight.rtol <= TIGHTEST_ATOL:
+            return marched
+        if (part := share_of_tolerance(tight, marched.march.steps, marched.march.states)) > 0.5:
+            return marched
         share = max(part * share, TIGHTEST_ATOL / problem.rtol)
 
 
-def _attempt(problem: Problem | DaeProblem, open_solver: Opener, inner: InnerTimes) -> Marched:
-    x = np.asarray(problem.x0, dtype=float)
-    marched: list[_MarchedPiece] = []
-    left, pace = problem.max_steps, Pace(problem)
-    for piece in pieces(problem):
-        opened, crossings = open_solver(piece, start_of_piece(problem, piece, x)), Crossings(problem, piece)
-        watch = GuardWatch(problem, piece.low, piece.high)
-        x, t, longest = opened.start, piece.start, np.inf
-        marched.append(_MarchedPiece(x, []))
-        while t < piece.end:
-            if left <= 0:
-                raise failure(problem, "sundials", t, x, used_up(problem))
-            end, state = _step(problem, piece, opened, t, x, longest)
-            # Its formulas meet a law at the ends of steps alone, so that a step may be cut off at a switch.
-            inside = StepInside(opened, t, x, end, state)
-            stop = watch.cut(t, x, end, state, inside)
-            cut = crossings.cut(t, x, end, state, inside, again=False)
-            stops = stop is not None and (cut is None or stop <= cut)
-            shortest = LEAST * (problem.t_end - problem.t0)
-            if stop is not None and stops and end - t > shortest and not watch.follows(t, x, stop, inside):
-                longest, left = (end - t) / SHORTER, left - 1
-                opened = open_solver(replace(piece, start=t), x)
-                x = opened.start
-                continue
-            whole, end = end, stop if stop is not None and stops else end if cut is None else cut
-            x = state if end == whole else opened.inside(np.array([end]))[0]
-            if (objection := pace.objection(end, rests=crossings.rests)) is not None:
-                raise failure(problem, "sundials", end, x, objection)
-            times = inner(t, end)
-            within = times[times < end]
-            states = np.repeat(x[None, :], times.size, axis=0)
-            if within.size:
-                states[: within.size] = inside(within)
-            marched[-1].steps.append(_CvodeStep(t, end, x, states))
-            t, left = end, left - 1
-            if stops and t < piece.end:
-                return marched, watch.met
-            if t < piece.end and (cut is not None or opened.outgrown()):
-                opened = open_solver(replace(piece, start=t), x)
-                x = opened.start
-            elif within.size or problem.switches is not None or problem.guards is not None:
-                opened.solver.step(end)  # after an interpolation SUNDIALS gives the end of the step once more
-    return marched, None
+class _SundialsStepper:
+    """CVODE or IDA.
 
+    Args:
+        problem: what is being solved.
+        opener: makes the solver at the start of a piece.
+        inner: the times wanted in each step.
+    """
 
-def _step(
-    problem: Problem | DaeProblem, piece: SmoothInterval, opened: OpenedSolver, t: float, x: Array, longest: float
-) -> tuple[float, Array]:
-    """End in s and state (n,) there of the next step from a time and state, which is `longest` s long at most."""
-    stop = min(piece.end, t + longest)
-    # SUNDIALS prints what its result says as well.
-    with np.errstate(all="ignore"), unprinted():
-        result = opened.solver.step(stop, method="onestep", tstop=stop)
-    if not result.success:
-        raise failure(problem, "sundials", t, x, str(result.message), opened.guard)
-    end, state = float(result.t), result.y.copy()
-    check_finite(problem, "sundials", end, state)
-    if end <= t:
-        raise failure(problem, "sundials", t, x, "the step became too small", opened.guard)
-    return end, state
+    engine = "sundials"
+    cuts_off = True  # its formulas meet a law at the ends of steps alone
+
+    def __init__(self, problem: Problem | DaeProblem, opener: Opener, inner: InnerTimes) -> None:
+        self._problem, self._opener, self._inner = problem, opener, inner
+        self.inside: list[Array] = []
+
+    def open(self, piece: SmoothInterval, t: float, x: Array) -> Array:
+        if t == piece.start:
+            self._piece, self._longest = piece, np.inf
+        self._opened, self._read = self._opener(replace(self._piece, start=t), x), False
+        return self._opened.start
+
+    def step(self, t: float, x: Array) -> Step:
+        if self._opened.outgrown():
+            self.open(self._piece, t, x)
+        if self._read:
+            self._opened.solver.step(t)  # after an interpolation SUNDIALS gives the end of the step once more
+            self._read = False
+        stop = min(self._piece.end, t + self._longest)
+        with unprinted():  # SUNDIALS prints what its result says as well
+            result = self._opened.solver.step(stop, method="onestep", tstop=stop)
+        if not result.success:
+            raise failure(self._problem, "sundials", t, x, str(result.message), self._opened.guard)
+        end, state = float(result.t), result.y.copy()
+        check_finite(self._problem, "sundials", end, state)
+        if end <= t:
+            raise failure(self._problem, "sundials", t, x, "the step became too small", self._opened.guard)
+        self._dense = StepInside(self._opened, t, x, end, state)
+        return Step(end, state, self._states)
+
+    def _states(self, times: Array) -> Array:
+        self._read = True
+        return self._dense(times)
+
+    def again(self, t: float, x: Array, end: float, longest: float) -> None:  # noqa: ARG002 (it is cut off at switches)
+        self.open(self._piece, t, x)
+        self._longest = longest
+
+    def take(self, t: float, end: float, state: Array) -> None:
+        times = self._inner(t, end)
+        within = times[times < end]
+        states = np.repeat(state[None, :], times.size, axis=0)
+        if within.size:
+            states[: within.size] = self._states(within)
+        self.inside.append(states)
 
 
 def _trajectory(problem: Problem | DaeProblem, opening: Opening, degree: int) -> Trajectory:
     dense = _CvodeReplay(problem, opening, degree)
     if problem.t_eval is None:
-        t, states = both_sides(problem, *_step_ends(dense.marched[0]))
-        end = float(t[-1]), states[-1]
-        return Trajectory(t, states, dense, {"steps": dense.steps.size - 1}, met=dense.marched[1], end=end)
+        whole = dense.marched.march
+        t, states = whole.both_sides(problem)
+        return Trajectory(t, states, dense, {"steps": dense.steps.size - 1}, met=whole.met, end=whole.end)
     times = np.asarray(problem.t_eval, dtype=float)
-    rows: list[Array] = []
     jumps = frozenset(problem.breakpoints)  # only asked for membership
 
     def inner(start: float, end: float) -> Array:
@@ -227,46 +186,46 @@ def _trajectory(problem: Problem | DaeProblem, opening: Opening, degree: int) ->
         side: Literal["left", "right"] = "left" if end in jumps else "right"
         return times[np.searchsorted(times, start, side="right") : np.searchsorted(times, end, side=side)]
 
-    marched, met = _march(problem, opening, inner)
-    steps = sum(len(piece.steps) for piece in marched)
-    if steps * problem.x0.size <= MOST_KEPT:
-        dense.ends = tuple(map(np.concatenate, _step_ends(marched)))
-    for piece in marched:
-        if piece.steps[0].start in times:
-            rows.append(piece.start[None, :])
-        rows.extend(step.inside for step in piece.steps)
-    last = marched[-1].steps[-1]
-    states = np.concatenate([np.empty((0, last.state.size)), *rows])
-    return Trajectory(times[: len(states)], states, dense, {"steps": steps}, met=met, end=(last.end, last.state))
+    marched = _run(problem, opening, inner)
+    whole, inside = marched.march, iter(marched.inside)
+    steps = sum(len(piece.times) - 1 for piece in whole.pieces)
+    if steps * problem.x0.size <= 1_000_000:  # more numbers than these are not kept
+        dense.ends = whole.both_sides(problem)
+    rows = [np.empty((0, whole.end[1].size))]
+    for piece in whole.pieces:
+        if piece.times[0] in times:
+            rows.append(piece.states[0][None, :])
+        rows.extend(islice(inside, len(piece.times) - 1))
+    states = np.concatenate(rows)
+    return Trajectory(times[: len(states)], states, dense, {"steps": steps}, met=whole.met, end=whole.end)
 
 
 class _CvodeReplay:
     """Dense output that runs the problem again when it is first asked, and keeps each step's own polynomial."""
 
     def __init__(self, problem: Problem | DaeProblem, opening: Opening, degree: int) -> None:
-        self._problem = problem
-        self._opening = opening
-        self._degree = degree
+        self._problem, self._opening, self._degree = problem, opening, degree
         self.ends: tuple[Array, ...] = ()
         """Times and states at the step ends of an earlier run: who asks for these alone needs no further one."""
 
     @cached_property
-    def marched(self) -> Marched:
-        """Its pieces, and the guard that ended it."""
-        return _march(self._problem, self._opening, self._inner)
+    def marched(self) -> _Marched:
+        """The run, with the inner nodes of the polynomial of each step."""
+        return _run(self._problem, self._opening, self._inner)
 
     def _inner(self, start: float, end: float) -> Array:
         return interpolation_times(start, end, self._degree)[1:-1]
 
     @cached_property
     def _dense(self) -> PiecewiseDense:
+        inside = iter(self.marched.inside)
         parts = [
-            Interpolant(step.start, step.end, np.vstack([before, step.inside, step.state]))
-            for piece in self.marched[0]
-            for before, step in zip(piece.states, piece.steps, strict=False)
+            Interpolant(*span, np.vstack([before, next(inside), after]))
+            for piece in self.marched.march.pieces
+            for span, (before, after) in zip(pairwise(piece.times), pairwise(piece.states), strict=True)
         ]
-        starts = np.array([part.start for part in parts])
-        return PiecewiseDense(starts, tuple(parts), np.append(starts, parts[-1].end), self._problem.x0.size)
+        steps = self.marched.march.steps
+        return PiecewiseDense(steps[:-1], tuple(parts), steps, self._problem.x0.size)
 
     @property
     def steps(self) -> Array:
@@ -278,8 +237,3 @@ class _CvodeReplay:
             if np.array_equal(self.ends[0][last], times):
                 return self.ends[1][last]
         return self._dense(times)
-
-
-def _step_ends(marched: list[_MarchedPiece]) -> tuple[list[Array], list[Array]]:
-    """Times and states at the step ends of each piece."""
-    return [piece.times for piece in marched], [piece.states for piece in marched]

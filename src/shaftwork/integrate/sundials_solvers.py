@@ -23,9 +23,6 @@ Method = Literal["BDF", "Adams"]
 
 # SUNDIALS interpolates inside a step by a polynomial of at most this degree.
 DEGREES = {"BDF": 5, "Adams": 12}
-# Up to here a dense factorisation beats SuperLU. A band solver is not used: the binding passes its Jacobian as a full
-# matrix, which costs more than the factorisation saves.
-LARGEST_DENSE = 100
 FINEST = ENGINES["sundials"].finest
 
 
@@ -160,7 +157,9 @@ def _first_change(problem: Problem, x: Array, rates: Array) -> float:
 def _linear_solver(
     guard: GuardedFunctions, piece: SmoothInterval, x: Array, pattern: JacobianPattern
 ) -> dict[str, Any]:
-    if x.size <= LARGEST_DENSE:
+    # Up to here a dense factorisation beats SuperLU. A band solver is not used: the binding passes its Jacobian as a
+    # full matrix, which costs more than the factorisation saves.
+    if x.size <= 100:
 
         def fill_dense(t: float, y: Array, _: Array, full: Array) -> None:
             full[:] = guard.dense_jacobian(t, y)

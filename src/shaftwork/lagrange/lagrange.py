@@ -141,7 +141,7 @@ class Lagrangian:
 
         return typeset(self.kirchhoff, blocks_of(self, values=values))
 
-    def document(self, *, values: bool = False) -> str:
+    def document(self, *, values: bool = False, title: str | None = None) -> str:
         """A complete LaTeX document: energies, generalised forces and equations, and the nomenclature with the values.
 
         Args:
@@ -149,7 +149,7 @@ class Lagrangian:
         """
         from shaftwork.lagrange.lagrange_print import document
 
-        return document(self, values=values)
+        return document(self, values=values, title=title)
 
     def _repr_latex_(self) -> str:
         from shaftwork.lagrange.lagrange_print import blocks_of

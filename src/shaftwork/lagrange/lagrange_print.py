@@ -14,7 +14,7 @@ from shaftwork.latex.blocks import Block, Blocks
 from shaftwork.latex.document import in_sections, section
 from shaftwork.latex.nomenclature import nomenclature, unit
 from shaftwork.latex.printing import Line
-from shaftwork.latex.shaft_blocks import Sums
+from shaftwork.latex.shaft_sums import Sums
 
 if TYPE_CHECKING:
     from shaftwork.equations.second_order import Square
@@ -24,7 +24,7 @@ KINETIC, POTENTIAL, LOSS = "E_k", "E_p", r"\mathcal{R}"
 """Letters of the energies, after Abdelkader 2016, (19), and of Rayleigh's function."""
 
 
-def document(lagrangian: Lagrangian, *, values: bool) -> str:
+def document(lagrangian: Lagrangian, *, values: bool, title: str | None) -> str:
     """A LaTeX document that compiles as it is."""
     coordinates = {symbol.name: "coordinate" for symbol in lagrangian.coordinates}
     energies = {
@@ -32,27 +32,15 @@ def document(lagrangian: Lagrangian, *, values: bool) -> str:
         POTENTIAL: ("potential energy", "J", lagrangian.springs),
         LOSS: ("Rayleigh's function, half of the power lost", "W", lagrangian.dampers),
     }
-    besides = [(f"${letter}$", of, "--", unit(size)) for letter, (of, size, squares) in energies.items() if squares]
-    names = _names(lagrangian) | coordinates.keys()
-    sections = {
-        "Lagrange's equations": section(blocks_of(lagrangian, values=values)),
-        "Nomenclature": nomenclature(lagrangian.kirchhoff, names, coordinates, besides),
-    }
-    return in_sections(lagrangian.kirchhoff, sections)
-
-
-def _names(lagrangian: Lagrangian) -> set[str]:
-    """The names of all symbols in the equations; of a rate, of that of which it is the rate as well."""
-    rows = (*lagrangian.equations, *lagrangian.constraints)
-    positions = {rate_of(symbol): symbol for symbol in (*lagrangian.motion, *lagrangian.prescribed)}
-    quantities = lagrangian.kirchhoff.assembly.quantities
-    angles = {quantities.angle(number) for number in range(len(quantities.graph.nodes))}
-    symbols = {symbol for row in rows for symbol in row.left.free_symbols | row.right.free_symbols}
-    for symbol, law in (*lagrangian.laws.items(), *lagrangian.prescribed.items()):
-        symbols |= {symbol, *law.free_symbols}
-    for symbol in angles & lagrangian.motion.keys():
-        symbols |= {symbol, *lagrangian.motion[symbol].free_symbols}
-    return {symbol.name for symbol in symbols | {positions[rate] for rate in symbols & positions.keys()}}
+    general = [(r"$\mathcal{L}$", "Lagrange's function", "--", unit("J"))]
+    general += [(f"${letter}$", of, "--", unit(size)) for letter, (of, size, squares) in energies.items() if squares]
+    general += [("$q_{k}$", "coordinate", "--", "--"), ("$Q_{k}$", "generalised force", "--", "--")]
+    blocks = Blocks(lagrangian.kirchhoff, values)
+    equations = section(_LagrangeBlocks(lagrangian, blocks).printed())
+    names = {*blocks.used, *coordinates}
+    tables = nomenclature(lagrangian.kirchhoff, names, coordinates, general, tuple(blocks.helpers()))
+    sections = {"Lagrange's equations": equations, "Nomenclature": tables}
+    return in_sections(lagrangian.kirchhoff, sections, title)
 
 
 def blocks_of(lagrangian: Lagrangian, *, values: bool) -> tuple[Block, ...]:
@@ -65,7 +53,7 @@ class _LagrangeBlocks:
     def __init__(self, lagrangian: Lagrangian, blocks: Blocks) -> None:
         self.lagrangian, self.blocks, self.writer = lagrangian, blocks, blocks.writer
         self.graph = blocks.equations.form.graph
-        self.quantities = blocks.equations.assembly.quantities
+        self.quantities = blocks.quantities
 
     def printed(self) -> Iterator[Block]:
         """All blocks."""
@@ -130,7 +118,7 @@ class _LagrangeBlocks:
 
     def _motions(self) -> Iterator[Line]:
         """The equations of motion; one row for all inside a shaft that is printed as sums."""
-        inside = {self.graph.nodes[node] for summed in self._sums for node in summed.inside}
+        inside = {self.graph.nodes[node] for summed in self._sums for node in summed.shaft.inside}
         yield from (self._motion(row) for row in self.lagrangian.equations if row.node not in inside)
         for summed in self._sums:
             yield from summed.motion()
@@ -140,12 +128,12 @@ class _LagrangeBlocks:
         ends = [
             (summed, str(number))
             for summed in self._sums
-            for number, end in summed.ends
+            for number, end in summed.shaft.ends
             if self.graph.nodes[summed.part.nodes[end]] == row.node
         ]
         if not ends:
             return self.writer.line(row.sides)
-        twists = {node for summed, _ in ends for node in summed.twists}
+        twists = {node for summed, _ in ends for node in summed.shaft.twists}
         rates = (row.coordinate, rate_of(row.coordinate))
         shown = [
             square.pull(symbol)

@@ -26,12 +26,10 @@ from shaftwork.equations.kirchhoff import Row
 from shaftwork.equations.quantities import rate_of
 from shaftwork.formulation.gains import exactly, in_decimals
 from shaftwork.network.graph import GROUND
+from shaftwork.numerics.tolerances import TYPED
 
 if TYPE_CHECKING:
     from shaftwork.lagrange.lagrange import Lagrangian
-
-CLOSE = 1e-8
-"""A ratio solved for is the given one within this: ratios are typed to some ten digits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +181,7 @@ class _Comparisons:
             if symbol in numerator.free_symbols and (linear := Poly(numerator, symbol)).degree() == 1:
                 slope, rest = linear.all_coeffs()
                 value = cancel(-rest / slope)
-                if value.free_symbols <= values.keys() and abs(value.xreplace(values) / values[symbol] - 1) < CLOSE:
+                if value.free_symbols <= values.keys() and abs(value.xreplace(values) / values[symbol] - 1) < TYPED:
                     return {symbol: value}
         return {}
 

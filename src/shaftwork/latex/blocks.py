@@ -7,32 +7,32 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import zip_longest
 from typing import TYPE_CHECKING
 
-from sympy import Add, Expr, Float, Integer, Symbol, preorder_traversal
+from sympy import Add, Expr, Float, Symbol, preorder_traversal
 
+from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.domains import ELECTRICAL, ROTATION, TRANSLATION
 from shaftwork.core.errors import CompileError
-from shaftwork.equations.assembly import FactoredTerms, Sides, sides, terms_of, tidy
+from shaftwork.equations.assembly import Sides, sides, terms_of
+from shaftwork.equations.dimensions import unit_of
 from shaftwork.equations.notations import in_letters
-from shaftwork.equations.quantities import ThroughQuantity, rate_of
-from shaftwork.equations.second_order import SecondOrder
+from shaftwork.equations.quantities import Quantities, ThroughQuantity, rate_of
 from shaftwork.equations.spelling import INDEX_CLOSES, INDEX_OPENS, in_text
-from shaftwork.latex.printing import LINE_WIDTH, Line, Writer, printed_width, with_rates
-from shaftwork.latex.shaft_blocks import MEANING, WEIGHTS, Sums, lines_of_field, sums_of
+from shaftwork.latex.compact_rows import SpectralShaft, compact_assembly, in_sums, spectral_shafts
+from shaftwork.latex.field_lines import lines_of_field
+from shaftwork.latex.nomenclature import Cells, breakable, unit
+from shaftwork.latex.printing import Line, Writer, with_rates
+from shaftwork.latex.shaft_sums import MEANING, Sums, printed_sums, printed_weights, rows_of_sums
 from shaftwork.network.kinds import Kind
 
 if TYPE_CHECKING:
-    from shaftwork.equations.kirchhoff import Eliminated, Row, StateEquation
+    from shaftwork.equations.kirchhoff import Eliminated, Row
     from shaftwork.equations.records import Equations
 
 AUXILIARY = (r"\sigma", r"\zeta", r"\xi", r"\chi")
 """Letters for sums that occur more than once in a law, such as a slip."""
-LARGEST_MATRIX = 6
-"""Coordinates up to which the second-order form is printed as matrices."""
-SHORTEST_SHARED = 3
-"""Operations in a sum from which on it is worth a letter of its own."""
+ORDINALS = ("first", "second", "third")
 BALANCES = {ROTATION: "torques", TRANSLATION: "forces", ELECTRICAL: "currents"}
 
 
@@ -63,55 +63,107 @@ class Blocks:
         Args:
             twists: print whose integrals the angles in laws are; not needed above the state form, which says it.
         """
-        equations = self.equations
-        domains = dict.fromkeys(equations.form.graph.domains)
+        domains = dict.fromkeys(self.equations.form.graph.domains)
         balanced = " and ".join(", ".join(BALANCES[domain] for domain in domains).rsplit(", ", 1))
-        nodes = [row for number, row in enumerate(equations.nodes) if number not in self.inside]
+        nodes = [row for number, row in enumerate(self.rows.nodes) if number not in self.inside | self.twists]
         balances = (summed.balance() for summed in self.sums)
         yield Block(f"Balance of {balanced} at the nodes", (*self._lines(nodes), *balances))
-        loops = [row for row in equations.loops if equations.assembly.ends(row.link)[0] not in self.twists]
+        loops = [row for row in self.rows.loops if self._ends_of(row.link)[0] not in self.twists]
         rates = (line for summed in self.sums for line in summed.loops())
         yield Block("Speeds around the loops", (*self._lines(loops), *rates))
-        around = {_to_rounding(row.expression) for row in equations.loops}  # only asked for membership
-        said = [(_to_rounding(row.expression), _to_rounding(-row.expression)) for row in equations.couplings]
-        couplings = [row for row, both in zip(equations.couplings, said, strict=True) if around.isdisjoint(both)]
-        lossy = any(branch.template.through for branch in equations.form.graph.branches)
-        yield Block("Couplings" if lossy else "Ideal couplings", tuple(self._lines(couplings)))
-        integrals = [row for row in equations.states if row.name in self._integrals] if twists else []
+        lossy = any(branch.template.through for branch in self.equations.form.graph.branches)
+        yield Block("Couplings" if lossy else "Ideal couplings", tuple(self._lines(self._couplings())))
+        integrals = [row for row in self.rows.states if row.name in self._integrals] if twists else []
         yield Block("Laws of the parts", (*self._laws(), *self._lines(integrals)))
+
+    def _couplings(self) -> Iterator[Row]:
+        """The couplings that say what no loop says."""
+        rows = self.rows
+        around = {_to_rounding(row.expression) for row in rows.loops}  # only asked for membership
+        along = {branch for shaft in self.shafts for branch in shaft.couplings}  # so is this
+        for row in rows.couplings:
+            said = _to_rounding(row.expression), _to_rounding(-row.expression)
+            if row.branches[0] not in along and around.isdisjoint(said):
+                yield row
 
     @cached_property
     def _integrals(self) -> frozenset[str]:
         return frozenset(state.name for state in self.equations.form.states if state.kind == "integral")
 
+    @property
+    def used(self) -> tuple[str, ...]:
+        """The names of the quantities in all that has been printed so far, without rates and sums."""
+        used = dict.fromkeys(map(_without_rate, self.writer.used))
+        for family in (family for shaft in self.shafts for family in shaft.families):
+            if any(symbol.name in used for symbol in family):
+                used.update(dict.fromkeys(str(symbol.name) for symbol in family))
+        return tuple(used)
+
+    def helpers(self) -> Iterator[Cells]:
+        """Rows of a nomenclature: letters for sums in laws that have been printed so far, and for weights."""
+        units = {letter.name: letter.unit for letter in self.equations.letters}
+        graph = self.equations.form.graph
+        for flow, (shared, _) in self._split.items():
+            of = f"in the law of ${self.equations.symbol_names[self.quantities.through(flow).name]}$"
+            for ordinal, (letter, total) in zip(ORDINALS, shared, strict=False):
+                units[letter.name] = unit_of(total, units)
+                if letter.name in self.writer.used:
+                    which = f"{ordinal} sum" if len(shared) > 1 else "sum"
+                    name, owner = self._auxiliary_names[letter.name], breakable(graph.parts[flow.part].name)
+                    yield f"${name}$", f"{which} {of}", owner, unit(units[letter.name])
+            noises = (noise for term in self._split[flow][1] for noise in term.atoms(HeldNoise, SmoothNoise))
+            for name in sorted({self.writer.latex(noise).partition(r"\left(")[0] for noise in noises}):
+                yield f"${name}$", "function with random values", breakable(graph.parts[flow.part].name), "--"
+        yield from rows_of_sums(self.sums, self.used)
+
     def derived(self) -> Block:
         """The definitions of the letters that stand for several parameters; nothing where numbers are printed."""
         definitions = {} if self.values else self.equations.definitions
         pairs = in_letters(definitions, self.equations.inverses)
-        weights = (WEIGHTS,) if self.sums else ()
+        weights = {summed.shaft.mark: summed.definition() for summed in self.sums}
         return Block(
             "Derived quantities",
-            (*(self.writer.line(sides(symbol, (law,))) for symbol, law in pairs), *weights),
+            (*(self.writer.line(sides(symbol, (law,))) for symbol, law in pairs), *weights.values()),
             MEANING if weights else "",
         )
 
     @cached_property
-    def sums(self) -> tuple[Sums, ...]:
+    def shafts(self) -> tuple[SpectralShaft, ...]:
         """The shafts whose rows are printed as sums."""
-        return sums_of(self.equations.assembly.quantities, self.writer)
+        return spectral_shafts(self.equations.assembly.quantities)
+
+    @cached_property
+    def sums(self) -> tuple[Sums, ...]:
+        """Their general rows."""
+        return tuple(Sums(shaft, self.writer) for shaft in self.shafts)
+
+    @cached_property
+    def rows(self) -> Equations:
+        """The equations with the whole torques along these shafts in them, and with h in the inertia of their ends."""
+        if not self.shafts:
+            return self.equations
+        return self.equations.from_assembly(compact_assembly(self.equations.form, self.shafts))
+
+    @property
+    def quantities(self) -> Quantities:
+        """The symbols of these rows."""
+        return self.rows.assembly.quantities
 
     @cached_property
     def inside(self) -> frozenset[int]:
         """The nodes between the ends of these shafts."""
-        return frozenset(node for summed in self.sums for node in summed.inside)
+        return frozenset(node for shaft in self.shafts for node in shaft.inside)
 
     @cached_property
     def twists(self) -> frozenset[int]:
         """The nodes whose speeds are rates of twist of these shafts."""
-        return frozenset(node for summed in self.sums for node in summed.twists)
+        return frozenset(node for shaft in self.shafts for node in shaft.twists)
 
-    def _is_summed(self, row: StateEquation) -> bool:
-        return self.equations.assembly.ends(row.branches[0])[0] in self.inside | self.twists
+    def _ends_of(self, branch: int) -> tuple[int, int]:
+        return self.rows.assembly.ends(branch)
+
+    def _is_summed(self, branch: int) -> bool:
+        return self._ends_of(branch)[0] in self.inside | self.twists
 
     def state(self, *, laws: bool = True) -> Iterator[Block]:
         """Rates of the states, what stands in them, and what was eliminated.
@@ -119,34 +171,17 @@ class Blocks:
         Args:
             laws: print the laws that stand in the rates; not needed below Kirchhoff's equations, which contain them.
         """
-        rows = [row for row in self.equations.states if not self._is_summed(row)]
+        rows = [row for row in self.rows.states if not self._is_summed(row.branches[0])]
         shown = [row.sides if row.explicit and _rates_in(row.coupled.left) <= 1 else row.coupled for row in rows]
         coupled = any(shape is not row.sides for shape, row in zip(shown, rows, strict=True))
         remark = "Rates that stand together on a left side are coupled by inertias or springs." if coupled else ""
         summed = (line for sums in self.sums for line in sums.states())
-        yield Block("State equations", (*map(self.writer.line, shown), *summed), remark)
-        algebraic = [row for row in self.equations.eliminated if row.kind == "algebraic"]
+        yield Block("State equations", (*map(self._line, shown), *summed), remark)
+        algebraic = [row for row in self.rows.eliminated if row.kind == "algebraic"]
         standing = self._laws_in_states() if laws else ()
         yield Block("where", (*standing, *self._lines(algebraic)))
-        dependent = [row for row in self.equations.eliminated if row.kind in ("speed", "torque")]
+        dependent = [row for row in self.rows.eliminated if row.kind in ("speed", "torque")]
         yield Block("Eliminated quantities", tuple(self._explained(dependent)))
-
-    def second_order(self) -> Iterator[Block]:
-        """M phi'' + D phi' + K phi = T: as matrices where they fit on a page, else row by row."""
-        form = self.equations.second_order
-        size = len(form.coordinates)
-        lines = tuple(self._matrices(form)) if size <= LARGEST_MATRIX else ()
-        if not lines or max(map(_matrix_width, lines)) > LINE_WIDTH:
-            lines = tuple(self._motions(form))
-        yield Block("Equations of motion", lines)
-        flows = self.equations.assembly.quantities.flows
-        by_symbol = [flow for flow in flows if self.equations.assembly.quantities.through(flow) in form.laws]
-        laws = [line for flow in by_symbol for line in self.law(flow, form.at.motion)]
-        assembly = self.equations.assembly
-        for end, other in assembly.opposite.items():
-            across = assembly.quantities.across(assembly.ends(other)).xreplace(form.at.motion)
-            laws.append(self.writer.line(assembly.law_of_history(end, across)))
-        yield Block("where", tuple(laws), r"Angles are counted from the untwisted position.")
 
     def fields(self) -> Iterator[Block]:
         """Long shafts before they are divided.
@@ -162,61 +197,37 @@ class Blocks:
             yield Block("At its ends", boundary)
             yield Block("Derived quantities", definitions)
 
-    def _matrices(self, form: SecondOrder) -> Iterator[Line]:
-        yield Line(
-            r"\mathbf{M} \, \ddot{\mathbf{q}} + \mathbf{D} \, \dot{\mathbf{q}} + \mathbf{K} \, \mathbf{q}",
-            (r"\mathbf{T}",),
-        )
-        size = range(len(form.coordinates))
-        transposed = " & ".join(map(self.writer.latex, form.coordinates))
-        yield Line(r"\mathbf{q}", (rf"\begin{{bmatrix}} {transposed} \end{{bmatrix}}^{{\mathsf{{T}}}}",))
-        for name, entries in (("M", form.mass), ("D", form.damping), ("K", form.stiffness)):
-            rows = ([entries.get((i, j), Integer(0)) for j in size] for i in size)
-            yield Line(rf"\mathbf{{{name}}}", (self._matrix(rows),))
-        yield Line(r"\mathbf{T}", (self._matrix([force] for force in form.forces),))
-
-    def _matrix(self, rows: Iterable[Iterable[Expr]]) -> str:
-        inner = r" \\ ".join(" & ".join(self.writer.latex(tidy(entry)) for entry in row) for row in rows)
-        return rf"\begin{{bmatrix}} {inner} \end{{bmatrix}}"
-
-    def _motions(self, form: SecondOrder) -> Iterator[Line]:
-        """Row by row; shafts whose ends are coordinates have one row for all inside."""
-        nodes, summed = self.equations.form.graph.nodes, self.summed_between(form.nodes)
-        inside = {nodes[node] for sums in summed for node in sums.inside}
-        yield from (self._motion(form, row) for row, node in enumerate(form.nodes) if node not in inside)
-        for sums in summed:
-            yield from sums.motion()
-
     def summed_between(self, free: Collection[str]) -> tuple[Sums, ...]:
-        """The shafts whose rows are printed as sums in the equations of motion: the nodes at both ends are free."""
+        """The shafts whose rows are printed as sums in Lagrange's equations: the nodes at both ends are free."""
         nodes = self.equations.form.graph.nodes
         return tuple(sums for sums in self.sums if {nodes[sums.part.nodes[end]] for end in ("a", "b")} <= set(free))
-
-    def _motion(self, form: SecondOrder, row: int) -> Line:
-        left = self.writer.pieces((FactoredTerms(Integer(1), tuple(map(tidy, form.terms(row)))),))
-        force = form.forces[row]
-        right = self.writer.pieces(sides(Integer(0), terms_of(force)).groups) or ("0",)
-        return Line("", (*left, f"= {right[0]}", *right[1:]), relation="")
 
     @cached_property
     def writer(self) -> Writer:
         """Prints the expressions of this network."""
         names = {**self.equations.symbol_names, **self._auxiliary_names}
         graph = self.equations.form.graph
-        parameters = {letter.name for letter in self.equations.letters if letter.parameter}
+        weights = {name: latex for shaft in self.shafts for name, latex in printed_weights(shaft).items()}
+        sums = [printed_sums(shaft, names) for shaft in self.shafts]
+        names |= {name: latex for of_shaft in (weights, *sums) for name, latex in of_shaft.items()}
+        parameters = {*(letter.name for letter in self.equations.letters if letter.parameter), *weights}
         order = sorted(names, key=lambda name: name not in parameters)
-        ordered = with_rates({name: names[name] for name in order}, self.equations.source.rate_of)
+        ordered = with_rates({name: names[name] for name in order}, self.equations.notation.rate_of)
         values = self.equations.values if self.values else {}
         printed = {**ordered, **_dotted(self.equations)}
-        angles = map(self.equations.assembly.quantities.angle, range(len(graph.nodes)))
-        last = {name for name in printed if name.startswith("der(")} | {angle.name for angle in angles}
+        angles = map(self.quantities.angle, range(len(graph.nodes)))
+        rates = {name for name in printed if name.startswith("der(")}
+        last = rates | {angle.name for angle in angles} | {name for of_shaft in sums for name in of_shaft}
         return Writer(printed, parameters, last, values, self.equations.inverses)
+
+    def _line(self, row: Sides, remark: str = "") -> Line:
+        return self.writer.line(in_sums(row, self.shafts), remark)
 
     def _lines(self, rows: Iterable[Row]) -> Iterator[Line]:
         seen: dict[str, None] = {}
         for row in rows:
             if not row.trivial:
-                line = self.writer.line(row.sides)
+                line = self._line(row.sides)
                 if line.text not in seen:
                     yield line
                 seen[line.text] = None
@@ -224,15 +235,20 @@ class Blocks:
     def _explained(self, rows: Iterable[Eliminated]) -> Iterator[Line]:
         for row in rows:
             if not row.trivial:
-                yield self.writer.line(row.sides, rf"\text{{({_with_indices(row.why)})}}")
+                yield self._line(row.sides, rf"\text{{({_with_indices(row.why)})}}")
 
     def _laws(self) -> Iterator[Line]:
-        for row in self.equations.laws:
-            flow = self.equations.assembly.quantities.flow_of[row.branches[0]]
-            if row.left == self.equations.assembly.quantities.through(flow):
+        quantities = self.quantities
+        for row in self.rows.laws:
+            if self._is_summed(row.branches[0]):
+                continue
+            flow = quantities.flow_of[row.branches[0]]
+            if row.left == quantities.through(flow):
                 yield from self.law(flow, {})
             elif not row.trivial:
                 yield self.writer.line(self._by_inverse(row.sides))
+        for summed in self.sums:
+            yield from summed.laws()
 
     def _by_inverse(self, row: Sides) -> Sides:
         """The law of a store, with the reciprocal of its coefficient beside the rate where that has the letter."""
@@ -244,7 +260,7 @@ class Blocks:
 
     def _laws_in_states(self) -> Iterator[Line]:
         """Nonlinear laws and sources, in terms of the states."""
-        assembly = self.equations.assembly
+        assembly = self.rows.assembly
         flows = dict.fromkeys(assembly.quantities.flow_of[branch] for branch in sorted(assembly.lumped))
         for flow in flows:
             across = assembly.quantities.across((flow.plus, flow.minus))
@@ -262,13 +278,13 @@ class Blocks:
         """Whether a prescribed across variable stands anywhere by its letter, and not by the sum that it is."""
         if not self.equations.assembly.is_sum(source):
             return True
-        rows = (*self.equations.states, *self.equations.eliminated)
-        letters = self.equations.assembly.quantities.across(self.equations.assembly.ends(source)).free_symbols
+        rows = (*self.rows.states, *self.rows.eliminated)
+        letters = self.quantities.across(self.equations.assembly.ends(source)).free_symbols
         return any(not letters.isdisjoint(row.expression.free_symbols) for row in rows)
 
     def law(self, flow: ThroughQuantity, replaced: Mapping[Expr, Expr]) -> Iterator[Line]:
         """A flow's law, and the letters in it; nothing where the law is a parameter alone."""
-        symbol = self.equations.assembly.quantities.through(flow)
+        symbol = self.quantities.through(flow)
         shared, terms = self._split[flow]
         if terms != (symbol,):
             yield self.writer.line(sides(symbol, (term.xreplace(replaced) for term in terms)))
@@ -278,7 +294,7 @@ class Blocks:
     @cached_property
     def _split(self) -> dict[ThroughQuantity, tuple[tuple[tuple[Symbol, Expr], ...], tuple[Expr, ...]]]:
         """For each flow the letters in its law and the terms that contain them."""
-        assembly = self.equations.assembly
+        assembly = self.rows.assembly
         split = {}
         for number, flow in enumerate(assembly.quantities.flows):
             if any(assembly.kind(branch) is Kind.ACROSS_SOURCE for branch in flow.branches):
@@ -292,11 +308,18 @@ class Blocks:
         taken = {*self.equations.symbol_names.values()}  # only asked for membership
         names: dict[str, str] = {}
         for flow, (shared, _) in self._split.items():
-            through = self.equations.symbol_names[self.equations.assembly.quantities.through(flow).name]
+            through = self.equations.symbol_names[self.quantities.through(flow).name]
             subscript = re.sub(r"^[^_]*", "", through)
             free = iter(letter + subscript for letter in AUXILIARY if letter + subscript not in taken)
             names.update({symbol.name: next(free) for symbol, _ in shared})
         return names
+
+
+def _without_rate(name: str) -> str:
+    """The name of a quantity by that of its rate or of the rate of that."""
+    while name.startswith("der("):
+        name = name[4:-1]
+    return name
 
 
 def _rates_in(left: Expr) -> int:
@@ -310,9 +333,14 @@ def _to_rounding(expression: Expr) -> Expr:
 
 
 def _shared_sums(terms: tuple[Expr, ...], owner: str) -> tuple[tuple[tuple[Symbol, Expr], ...], tuple[Expr, ...]]:
-    """Long sums that occur several times in a law, under symbols of their own, and the law with these symbols."""
+    """Sums of a law under symbols of their own, and the law with these symbols: long ones that occur several times, and
+    those that alone, as factors, are longer than a line.
+    """
     counted = Counter(node for term in terms for node in preorder_traversal(term) if node.is_Add)
-    candidates = [node for node, times in counted.items() if times > 1 and node.count_ops() >= SHORTEST_SHARED]
+    # a sum of fewer operations is not worth a letter; one of more can only be broken where it stands alone
+    candidates = [
+        node for node, times in counted.items() if node.count_ops() >= (3 if times > 1 else 40) and node not in terms
+    ]
     shared: list[tuple[Symbol, Expr]] = []
     for node in candidates[: len(AUXILIARY) - 1]:
         letter = Symbol(f"{owner}, sum {len(shared) + 1}", real=True)
@@ -332,13 +360,6 @@ def _dotted(equations: Equations) -> dict[str, str]:
         dotted[velocity.name] = rf"\dot{{{letter}}}{underscore}{subscript}"
         dotted[rate_of(velocity).name] = rf"\ddot{{{letter}}}{underscore}{subscript}"
     return dotted
-
-
-def _matrix_width(line: Line) -> float:
-    """Width of a matrix: that of its columns, and the room between them."""
-    rows = (row.split("&") for row in line.pieces[0].split(r"\\"))
-    columns = list(zip_longest(*rows, fillvalue=""))
-    return sum(max(map(printed_width, column)) for column in columns) + 1.8 * (len(columns) - 1) + 2.0
 
 
 def _with_indices(sentence: str) -> str:

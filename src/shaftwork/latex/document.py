@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Literal, get_args
 
+from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import CompileError, ShaftworkError
 from shaftwork.equations.quantities import INSTEAD
 from shaftwork.equations.spelling import in_text, without_marks
 from shaftwork.latex.blocks import Block, Blocks
 from shaftwork.latex.nomenclature import nomenclature
 from shaftwork.latex.printing import aligned
+from shaftwork.latex.second_order_blocks import SecondOrderBlocks
 from shaftwork.latex.series import shortened
 
 if TYPE_CHECKING:
@@ -64,7 +66,15 @@ def blocks_of(equations: Equations, form: Form | None, *, values: bool) -> tuple
     Raises:
         ShaftworkError: there is no such form.
     """
-    blocks = Blocks(equations, values)
+    return printed_blocks(Blocks(equations, values), form)
+
+
+def printed_blocks(blocks: Blocks, form: Form | None) -> tuple[Block, ...]:
+    """The same of blocks that know afterwards which letters have been printed.
+
+    Raises:
+        ShaftworkError: there is no such form.
+    """
     both = (*blocks.kirchhoff(twists=False), *blocks.state(laws=False)) if form is None else _form(blocks, form)
     derived = () if form == "field" else (blocks.derived(),)
     return tuple(block for block in (*both, *derived) if block.lines)
@@ -82,7 +92,7 @@ def _form(blocks: Blocks, form: Form) -> Iterable[Block]:
         case "state":
             return blocks.state()
         case "second-order":
-            return blocks.second_order()
+            return SecondOrderBlocks(blocks).printed()
         case "field":
             return blocks.fields()
     *names, last = map(repr, get_args(Form))
@@ -95,23 +105,35 @@ def _content(block: Block) -> str:
     return f"{remark}\\begin{{align*}}\n{rows}\n\\end{{align*}}"
 
 
-def document(equations: Equations, form: Form | None, *, values: bool) -> str:
-    """A LaTeX document that compiles as it is, of one form or of all."""
+def document(equations: Equations, form: Form | None, *, values: bool, title: str | None) -> str:
+    """A LaTeX document that compiles as it is, of one form or of all.
+
+    Raises:
+        ShaftworkError: there is no such form.
+        CompileError: the one form that is asked for does not exist for this network.
+    """
     blocks = Blocks(equations, values)
+    motions = SecondOrderBlocks(blocks)
     states = {state.name: "state" for state in equations.form.states}
-    symbols = {symbol.name for row in equations.rows for symbol in row.left.free_symbols | row.right.free_symbols}
+    remarks: tuple[str, ...] = ()
     if form is None:
         sections = {
             TITLES["kirchhoff"]: section((*blocks.kirchhoff(twists=False), blocks.derived())),
             TITLES["state"]: section(blocks.state(laws=False)),
-            TITLES["second-order"]: _second_order(blocks),
         }
+        try:
+            sections[TITLES["second-order"]] = section(motions.printed())
+        except CompileError as reason:
+            electrical = ELECTRICAL in equations.form.graph.domains
+            why = "the network has electrical nodes." if electrical else str(reason).removesuffix(INSTEAD)
+            remarks = (f"There is no second-order form: {why}",)
     else:
-        printed = _form(blocks, form)
-        derived = (blocks.derived(),) if form == "kirchhoff" else ()
-        sections = {TITLES[form]: _second_order(blocks) if form == "second-order" else section((*printed, *derived))}
-    sections["Nomenclature"] = nomenclature(equations, symbols | states.keys(), states)
-    return in_sections(equations, sections)
+        printed = printed_blocks(blocks, form)
+        sections = {TITLES[form]: section(printed)}
+    matrices = motions.helpers() if TITLES["second-order"] in sections else ()
+    helpers = (*blocks.helpers(), *matrices)
+    sections["Nomenclature"] = nomenclature(equations, {*blocks.used, *states}, states, helpers=helpers)
+    return in_sections(equations, sections, title, remarks)
 
 
 def joined(documents: Sequence[str]) -> str:
@@ -126,21 +148,22 @@ def joined(documents: Sequence[str]) -> str:
     return f"{head}{begin}{bodies}{end}"
 
 
-def in_sections(equations: Equations, sections: Mapping[str, str]) -> str:
-    """A LaTeX document of sections that say anything, after the phase and before remarks."""
-    remarks = "\n\n".join(in_text(note) for note in equations.notes)
-    whole = {"Phase": in_text(equations.phase), **sections, "Remarks": remarks}
-    printed = (f"\\section{{{title}}}\n{text}" for title, text in whole.items() if text)
-    title = in_text(equations.form.graph.name)
-    return "\n".join((PREAMBLE, f"\\title{{{title}}}", BEGIN, *printed, r"\end{document}", ""))
+def in_sections(
+    equations: Equations, sections: Mapping[str, str], title: str | None, remarks: Sequence[str] = ()
+) -> str:
+    """A LaTeX document of sections that say anything, after the phase and before remarks.
 
-
-def _second_order(blocks: Blocks) -> str:
-    """The second-order form, or why there is none."""
-    try:
-        return section(blocks.second_order())
-    except CompileError as reason:
-        return in_text(str(reason).removesuffix(INSTEAD))
+    Args:
+        equations: whose phase and notes are printed.
+        sections: LaTeX by heading.
+        title: of the document; by default the name of the network.
+        remarks: sentences before the notes of the equations.
+    """
+    notes = "\n\n".join(map(in_text, (*remarks, *equations.notes)))
+    whole = {"Phase": in_text(equations.phase), **sections, "Remarks": notes}
+    printed = (f"\\section{{{heading}}}\n{text}" for heading, text in whole.items() if text)
+    head = f"\\title{{{in_text(title or equations.form.graph.name)}}}"
+    return "\n".join((PREAMBLE, head, BEGIN, *printed, r"\end{document}", ""))
 
 
 def section(blocks: Iterable[Block]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Container, Iterator, Mapping, Sequence
 from itertools import zip_longest
 from typing import TYPE_CHECKING
@@ -20,16 +21,18 @@ if TYPE_CHECKING:
     from shaftwork.equations.records import Equations
 
 LAWS = "Formula, or points of a table, over $t$ in s if nothing else is said"
-ALL_DIGITS = 15
-"""Of the points of tables, which may lie close together."""
-POINTS = 40
-"""Of a table in one row: rows do not run over pages."""
+LAW_TOO = re.compile(", also over [^;]*")
+"""In the meaning of a parameter for those who set it; here it has a number."""
 UNITS = {"1": "--", "ohm": r"$\Omega$"}
 Cells = tuple[str, ...]
 
 
 def nomenclature(
-    equations: Equations, used: Container[str], noted: Mapping[str, str], besides: Sequence[Cells] = ()
+    equations: Equations,
+    used: Container[str],
+    noted: Mapping[str, str],
+    besides: Sequence[Cells] = (),
+    helpers: Sequence[Cells] = (),
 ) -> str:
     """The tables of the variables that equations contain, of the parameters, and of the laws that are given.
 
@@ -38,13 +41,18 @@ def nomenclature(
         used: names of the variables.
         noted: what some of them are besides, as "state", by name.
         besides: rows before them, of quantities that belong to no part.
+        helpers: rows after them, of letters that stand for sums and weights.
     """
-    tables = (variables((equations,), used, noted, besides), parameters(equations), laws(equations))
+    tables = (variables((equations,), used, noted, besides, helpers), parameters(equations), laws(equations))
     return "\n".join(filter(None, tables))
 
 
 def variables(
-    phases: Sequence[Equations], used: Container[str], noted: Mapping[str, str], besides: Sequence[Cells] = ()
+    phases: Sequence[Equations],
+    used: Container[str],
+    noted: Mapping[str, str],
+    besides: Sequence[Cells] = (),
+    helpers: Sequence[Cells] = (),
 ) -> str:
     """The table of the variables of one or several phases; the other arguments are those of `nomenclature`."""
     letters = {
@@ -53,11 +61,23 @@ def variables(
         for letter in equations.letters
         if not letter.parameter and letter.name in used
     }
-    rows = (
-        (_formula(latex), _meaning(letter, noted), _owner(letter), unit(letter.unit))
-        for latex, letter in letters.values()
+    rows = condensed(
+        [
+            (_formula(latex), _meaning(letter, noted), _owner(letter), unit(letter.unit))
+            for latex, letter in letters.values()
+        ]
     )
-    return table(_columns(48, 40, 38, 21), ("Variable", "Meaning", "Of", "Unit"), (*besides, *rows))
+    heads = ("Variable", "Meaning", "Of", "Unit")
+    return _ruled(_columns(48, 44, 34, 21), heads, [*besides, *_told_apart(tuple(rows)), *dict.fromkeys(helpers)])
+
+
+def _told_apart(rows: Sequence[Cells]) -> Iterator[Cells]:
+    """The rows, with their running numbers beside those meanings that several rows of a part have."""
+    meanings, seen = Counter(row[1:3] for row in rows), Counter[Cells]()
+    for symbol, meaning, owner, measure in rows:
+        seen[meaning, owner] += 1
+        several = meanings[meaning, owner] > 1
+        yield symbol, f"{meaning}, no.\\ {seen[meaning, owner]}" if several else meaning, owner, measure
 
 
 def parameters(equations: Equations, origins: Mapping[str, str] | None = None) -> str:
@@ -72,7 +92,7 @@ def parameters(equations: Equations, origins: Mapping[str, str] | None = None) -
     rows = [
         (
             _formula(names[letter.name]),
-            in_text(letter.meaning),
+            in_text(LAW_TOO.sub("", letter.meaning)),
             _owner(letter),
             f"${printed_number(values[letter.name])}$",
             unit(letter.unit),
@@ -102,11 +122,13 @@ def _laws(equations: Equations) -> Iterator[Cells]:
                 continue
             cells = [] if isinstance(law, Table) else [_formula(writer.latex(law))]
             for curve in sorted(law.atoms(Table), key=str):
+                # in all digits, as points may lie close together
                 points = [
-                    rf"${printed_number(x, ALL_DIGITS)} \mapsto {printed_number(y, ALL_DIGITS)}$"
+                    rf"${printed_number(x, 15)} \mapsto {printed_number(y, 15)}$"
                     for x, y in zip(curve.xs, curve.ys, strict=True)
                 ]
-                cells += [", ".join(points[first : first + POINTS]) for first in range(0, len(points), POINTS)]
+                # 40 in a row: rows do not run over pages
+                cells += [", ".join(points[first : first + 40]) for first in range(0, len(points), 40)]
             heads = [(in_text(declared.meaning), breakable(part.name), unit(declared.unit))]
             for (meaning, owner, measure), cell in zip_longest(heads, cells, fillvalue=("", "", "")):
                 yield meaning, owner, str(cell), measure
@@ -148,9 +170,14 @@ def unit(text: str) -> str:
 
 def table(columns: str, headings: Cells, rows: Sequence[Cells]) -> str:
     """A table that may run over pages; rows that differ by a running number are drawn together. Empty without rows."""
+    return _ruled(columns, headings, [*condensed(rows)])
+
+
+def _ruled(columns: str, headings: Cells, rows: Sequence[Cells]) -> str:
+    """A table of all these rows."""
     if not rows:
         return ""
-    body = "\n".join(f"{' & '.join(cells)} \\\\" for cells in _condensed(rows))
+    body = "\n".join(f"{' & '.join(cells)} \\\\" for cells in rows)
     text = f"""\\begin{{longtable}}{{@{{}}{columns}@{{}}}}
 \\toprule
 {" & ".join(headings)} \\\\
@@ -163,7 +190,8 @@ def table(columns: str, headings: Cells, rows: Sequence[Cells]) -> str:
     return without_marks(text)
 
 
-def _condensed(rows: Sequence[Cells]) -> Iterator[Cells]:
+def condensed(rows: Sequence[Cells]) -> Iterator[Cells]:
+    """Rows with those that differ by a running number drawn together."""
     series = series_in(["\n".join(cells) for cells in rows])
     inside = replaced(series)
     for place, cells in enumerate(rows):

@@ -40,8 +40,6 @@ WIDTHS = {
     r"\cdot": 1.3,
 }
 """Widths in units of an ordinary letter, about 5.7 points at a font size of 11 points."""
-LETTER, CAPITAL, GREEK, DIGIT = 1.0, 1.35, 1.1, 0.95
-SCRIPT_SIZE, SCRIPT_SPACE = 0.75, 0.1
 FUNCTION = re.compile(r"\\(tanh|cosh|sinh|cos|sin|tan|exp|log|sqrt|operatorname|max|min|sign)$")
 OPENS, CLOSES = "\ue002", "\ue003"
 """Stand for the brackets of a group until it is known whether it stays on one line."""
@@ -143,11 +141,15 @@ class Writer:
         self._parameters = {Symbol(name, real=True) for name in parameters}
         self._sums: dict[Expr, Symbol] = {}
         self._symbol_names = {**printed, TIME: "t"}
-        self._printer = _Printer({"symbol_names": self._symbol_names, "mul_symbol": r" \, "})
+        self.used: dict[str, None] = {}
+        """The names of all symbols that have been printed, in their order."""
+        self._printer = _Printer({"symbol_names": self._symbol_names, "mul_symbol": r" \, ", "inv_trig_style": "full"})
 
     def latex(self, expression: Expr) -> str:
         """An expression in LaTeX."""
-        return str(self._printer.doprint(self._in_order(self._valued(expression)).xreplace(self._ordered)))
+        valued = self._valued(expression)
+        self.used.update(dict.fromkeys(sorted(str(symbol.name) for symbol in valued.free_symbols)))
+        return str(self._printer.doprint(self._in_order(valued).xreplace(self._ordered)))
 
     def _valued(self, expression: Expr) -> Expr:
         """The expression with numbers for those parameters that are printed by their value, or with reciprocals."""
@@ -232,6 +234,13 @@ class Writer:
             return self.latex(term)
         text = rf"\left({self.latex(coefficient)}\right)" if coefficient.is_Add else self.latex(coefficient)
         return rf"{text} \, {self.latex(behind[0])}"
+
+    def factor(self, gain: Expr) -> tuple[str, str]:
+        """Sign and size of what stands before a product that is printed already; nothing for a size of 1."""
+        sign = "-" if gain.could_extract_minus_sign() else "+"
+        size = -gain if sign == "-" else gain
+        text = rf"\left({self.latex(size)}\right)" if size.is_Add else self.latex(size)
+        return sign, "" if size == 1 else rf"{text} \, "
 
     def _signed(self, term: Expr) -> str:
         text = self._product(term)
@@ -322,7 +331,7 @@ def _item(item: str, tokens: Iterator[str]) -> float:
         case "{":
             return _width(tokens, one=False)
         case "_" | "^":
-            return SCRIPT_SPACE + SCRIPT_SIZE * _width(tokens, one=True)
+            return 0.1 + 0.75 * _width(tokens, one=True)
         case r"\frac":
             return 0.4 + max(_width(tokens, one=True), _width(tokens, one=True))
         case r"\begin" | r"\end":
@@ -335,5 +344,6 @@ def _item(item: str, tokens: Iterator[str]) -> float:
     if FUNCTION.match(item):
         return 0.9 * len(item)
     if item.isdigit():
-        return DIGIT
-    return GREEK if item.startswith("\\") else CAPITAL if item.isupper() else LETTER
+        return 0.95
+    # widths of Greek and capital letters, measured in those of ordinary ones
+    return 1.1 if item.startswith("\\") else 1.35 if item.isupper() else 1.0

@@ -11,12 +11,6 @@ from functools import cached_property
 from shaftwork.equations.spelling import INDEX_CLOSES, INDEX_OPENS
 from shaftwork.latex.printing import Line
 
-SHORTEST_SERIES = 5
-"""Fewer equal rows are printed one by one."""
-SHORTEST_STRETCH = 4
-"""Fewer numbers of equal distance are listed one by one."""
-MOST_STRETCHES = 6
-"""A series whose numbers have more gaps than fit on a line is printed as several."""
 INDEX = re.compile(f"{INDEX_OPENS}([0-9]+){INDEX_CLOSES}")
 Numbers = tuple[int, ...]
 
@@ -82,12 +76,14 @@ def listed(stretch: Numbers, text: Callable[[int], str], dots: str) -> str:
 
 def _series_of(family: Mapping[int, Numbers]) -> Iterator[Series]:
     """The series in texts that are the same but for their indices, longest first."""
+    shortest = 5  # fewer equal rows are printed one by one
     left = dict(family)
-    while len(left) >= SHORTEST_SERIES:
+    while len(left) >= shortest:
         longest = max(_candidates(left), key=lambda series: len(series.members))
-        if len(longest.members) < SHORTEST_SERIES:
+        if len(longest.members) < shortest:
             return
-        numbers = dict.fromkeys(number for stretch in longest.stretches[:MOST_STRETCHES] for number in stretch)
+        # Numbers with more than six gaps do not fit on a line: the rest is a series of its own.
+        numbers = dict.fromkeys(number for stretch in longest.stretches[:6] for number in stretch)
         yield Series({number: longest.members[number] for number in numbers}, longest.running)
         for number in numbers:
             del left[longest.members[number]]
@@ -117,7 +113,8 @@ def _stretches(numbers: Numbers) -> Iterator[Numbers]:
         end = start + 1
         while end < len(numbers) and numbers[end] - numbers[end - 1] == numbers[start + 1] - numbers[start]:
             end += 1
-        if end - start < SHORTEST_STRETCH:
+        # Fewer than four numbers of equal distance are listed one by one.
+        if end - start < 4:
             end = start + 1
         yield numbers[start:end]
         start = end

@@ -21,7 +21,7 @@ from shaftwork.live.page import SCRIPTS, WEB, plotly_script, served_page
 from shaftwork.live.session import Session
 from shaftwork.modelfiles.storage import write_netlist
 from shaftwork.pipeline.network import Network
-from shaftwork.reporting.document import report
+from shaftwork.reporting.report import report
 
 if TYPE_CHECKING:
     from starlette.applications import Starlette

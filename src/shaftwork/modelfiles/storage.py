@@ -21,7 +21,7 @@ from shaftwork.core.files import replaced
 from shaftwork.modelfiles import textfile
 from shaftwork.modelfiles.textfile import ModelText, PartText
 from shaftwork.network.expressions import parse
-from shaftwork.network.grammar import COMPARISONS, FUNCTION_NAMES, FUNCTIONS, LIMITS, fault_of, words_of
+from shaftwork.network.grammar import COMPARISONS, FUNCTION_NAMES, FUNCTIONS, LIMITS, fault_of, tokens_of
 from shaftwork.network.netlist import Netlist, Origin, Placed, title
 
 _SIGNS = {relation: sign for sign, relation in COMPARISONS.items()}
@@ -101,10 +101,10 @@ def _refuse_endless_laws(model: ModelText) -> None:
     words = 0
     for part in model.parts:
         for name, value in part.parameters.items():
-            if not isinstance(value, str) or not _is_law(REGISTRY.get(part.type), name):
+            if not isinstance(value, str) or not _is_law(_class_of(part.type), name):
                 continue
             try:
-                words += len(words_of(value))
+                words += len(tokens_of(value))
             except ModelFileError as error:
                 raise _fault(part, name, f"{name}: {error}") from None
             if words > LIMITS.file_words:
@@ -150,8 +150,18 @@ def _saved(part: Component, name: str) -> Any:
         raise ModelFileError(f"{title(part)}: {name} cannot be saved: {error}") from None
 
 
+def _class_of(name: str) -> type[Component] | None:
+    """The class of a part by its name; of "ElectricalBrake", as `Network.circuit` makes it, the image of a class."""
+    original = REGISTRY.get(name.removeprefix("Electrical"))
+    if name in REGISTRY or original is None:
+        return REGISTRY.get(name)
+    from shaftwork.analogues.images import image_class
+
+    return image_class(original)
+
+
 def _placed(part: PartText, path: str) -> Placed:
-    cls = REGISTRY.get(part.type)
+    cls = _class_of(part.type)
     if cls is None:
         close = get_close_matches(part.type, REGISTRY, n=3) or tuple(REGISTRY)
         raise _fault(
@@ -187,7 +197,7 @@ def _read(part: PartText, cls: type[Component], name: str, value: Any) -> Any:
 
 def _fault(part: PartText, key: str, reason: str) -> ModelFileError:
     """What is wrong with a part, with its line in the file and, of a law, the unit of its values."""
-    declared = getattr(REGISTRY.get(part.type), "declared", {}).get(key)
+    declared = getattr(_class_of(part.type), "declared", {}).get(key)
     unit = f" It is a law for {key} in {declared.unit}." if declared is not None and declared.law else ""
     return ModelFileError(f"line {part.lines.get(key, part.lines[''])}, {part.type} '{part.name}': {reason}{unit}")
 

@@ -36,8 +36,6 @@ FORMAT = 1
 """Version of the format; a reader refuses any other."""
 LARGEST_FILE = 2_500_000
 """Bytes of a model file; 20000 parts take about 2 000 000."""
-LONGEST_KEY = 64
-"""Characters of the name of a parameter."""
 
 Value = int | float | str | Table
 """What a parameter may be in a file."""
@@ -297,7 +295,7 @@ def _check_name(key: str, value: Any) -> None:
 
 def _checked(key: str, value: Any) -> Value:
     """A parameter's value as it can stand in a file."""
-    if not isinstance(key, str) or not _KEY.fullmatch(key) or key in _RESERVED or len(key) > LONGEST_KEY:
+    if not isinstance(key, str) or not _KEY.fullmatch(key) or key in _RESERVED or len(key) > 64:
         raise ModelFileError(f"{key} is no name of a parameter. Use letters, digits and _, not {', '.join(_RESERVED)}.")
     match value:
         case bool():

@@ -28,7 +28,7 @@ from shaftwork.network.grammar import (
     Boolean,
     fail,
     fault_of,
-    words_of,
+    tokens_of,
 )
 
 _SIGNS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
@@ -58,7 +58,7 @@ def parse(text: str, symbols: Iterable[sympy.Symbol] = SYMBOLS) -> sympy.Expr:
         ModelFileError: the text is not of the grammar, or exceeds a limit of `grammar`; the message has the place,
             what is allowed there, and the next step.
     """
-    words_of(text)  # refuses most that is wrong, in plain words
+    tokens_of(text)  # refuses most that is wrong, in plain words
     reader = _LawReader(re.sub(r"\s", " ", text).strip(), symbols)
     try:
         return reader.read()

@@ -108,7 +108,7 @@ _HINTS = {
 ALLOWED = "Write numbers, names, + - * / ** ( ) , comparisons and Table([...], [...])."
 
 
-def words_of(text: str) -> list[str]:
+def tokens_of(text: str) -> list[str]:
     """The numbers, names, lists and signs of a text, in an order that an expression can have.
 
     Raises:

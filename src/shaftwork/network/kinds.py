@@ -53,8 +53,6 @@ Resolved = tuple[Kind, Expr]
 """A kind and the law of a branch of that kind."""
 CHANGE = "change"
 """The label of what there is beyond a constant."""
-SAMPLES = (0.37, 1.9, 2.7)
-"""What the other variables of a capacity are where its two sides of a jump are compared."""
 ROUNDING = 1e-9
 """So far beside a boundary, in parts of its place, conditions are read that hold on one side of it; and the part of a
 capacity by which its two sides may differ where it does not jump."""
@@ -192,7 +190,8 @@ def _jumps(capacity: Expr) -> Iterator[str]:
             continue
         symbol, place = boundary
         others = capacity.free_symbols | place.free_symbols
-        for shift in SAMPLES:
+        # what the other variables are where the two sides of a jump are compared
+        for shift in (0.37, 1.9, 2.7):
             at = {one: shift * (1 + number) for number, one in enumerate(sorted(others - {symbol}, key=str))}
             low, high = _sides(capacity.xreplace(at), symbol, float(place.xreplace(at)))
             if low.is_real and high.is_real and abs(high - low) > ROUNDING * max(abs(low), abs(high)):

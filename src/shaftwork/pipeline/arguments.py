@@ -18,12 +18,13 @@ from shaftwork.formulation.form import StateForm
 from shaftwork.integrate.engines import ENGINES
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.netlist import Netlist, by_part
+from shaftwork.results.extremes import MOST_OUTPUTS
 from shaftwork.results.solution import Solution
 
-OUTPUTS, MOST_OUTPUTS = 1001, 10_000_000
-"""Output times when the user gives none, and the most that can be asked for."""
 FINEST_RTOL = float(np.finfo(float).eps)
 """What doubles can keep; a smaller tolerance would promise what no engine holds."""
+OUTPUTS = 1001
+"""Output times where the user gives none."""
 NOMINAL = 1e-3
 """Absolute tolerance as a fraction of the relative one, for a speed of 1 rad/s (m/s, V)."""
 STUDIED = ("auto", *ENGINES, "wave")
@@ -248,7 +249,7 @@ def _numbers(part: Component) -> tuple[str, ...]:
 
 def changes_structure(form: StateForm, values: Mapping[str, float]) -> bool:
     """Whether other equations hold for new values: one becomes zero or ceases to, decides a ratio, or is of `Auto`."""
-    decisive = frozenset((*form.graph.zeros, *form.tree.frozen)) if values else frozenset()
+    decisive = frozenset((*form.graph.zeros, *form.tree.frozen))
     return any(name in decisive or value == 0 for name, value in values.items()) or branches_anew(form.graph, values)
 
 

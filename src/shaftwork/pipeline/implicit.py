@@ -41,7 +41,7 @@ class _NoStates:
         return np.zeros((len(times), 0))
 
 
-def at_rest(problem: Problem, degree: int | None) -> Trajectory:
+def without_states(problem: Problem, degree: int | None) -> Trajectory:
     """The run of a network without states: everything follows from the sources at every instant.
 
     Args:

@@ -12,15 +12,14 @@ import numpy as np
 
 from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
+from shaftwork.codegen.compiled_model import CompiledModel
 from shaftwork.codegen.model_observer import ModelObserver
-from shaftwork.codegen.operating import steady_state
 from shaftwork.codegen.start_values import initial_state, with_others
 from shaftwork.codegen.undefined_laws import refuse_vanishing
 from shaftwork.core.calls import BoundedCache, Callback
 from shaftwork.core.errors import Diagnostic, ParameterError
 from shaftwork.core.notices import PulsationWarning, muted
 from shaftwork.core.parameters import in_si
-from shaftwork.core.screen import counted, named, on_one_screen
 from shaftwork.formulation.form import StateForm
 from shaftwork.integrate import choice
 from shaftwork.integrate.engines import EngineName, available
@@ -43,7 +42,7 @@ from shaftwork.pipeline.arguments import (
     step_limit,
     time_span,
 )
-from shaftwork.pipeline.implicit import IMPLICIT, PRESCRIBED, at_rest, solve_loops, start_of_loops
+from shaftwork.pipeline.implicit import IMPLICIT, PRESCRIBED, solve_loops, start_of_loops, without_states
 from shaftwork.pipeline.motion_start import (
     Ending,
     Repetition,
@@ -55,9 +54,9 @@ from shaftwork.pipeline.motion_start import (
     time_of_start,
     warn_of_rest,
 )
-from shaftwork.pipeline.prepared import EngineModel, OperatingPoint, Prepared
-from shaftwork.pipeline.settled import SteadyState, refuse_moving, warn_of_earlier_levels
-from shaftwork.pipeline.sizes import in_its_size, with_accuracy
+from shaftwork.pipeline.overview import overview
+from shaftwork.pipeline.prepared import OperatingPoint, Prepared, in_its_size, with_accuracy
+from shaftwork.pipeline.settled import SteadyState, steady_operation
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
@@ -65,11 +64,9 @@ if TYPE_CHECKING:
 
 VARIANTS = 8
 """Models of other structure, and choices of an engine, that are kept for later calls."""
-SIMILAR = 5.0
-"""An engine suits parameters that differ by less than this factor too: looking anew would cost more than the run."""
 
 
-class Model(EngineModel):
+class Model(CompiledModel):
     """A network as a fast function of time, states and parameters, ready to be simulated again and again.
 
     Args:
@@ -84,6 +81,7 @@ class Model(EngineModel):
     def __init__(self, form: StateForm, netlist: Netlist, rebuild: Callable[[Netlist], Model]) -> None:
         super().__init__(form)
         self.netlist, self._rebuild = netlist, rebuild
+        self._prepared = BoundedCache[bytes, Prepared](1)
         self._variants = BoundedCache[tuple[tuple[str, float], ...], Model](VARIANTS)
         self._choices: list[tuple[tuple[float, float, float], Array, tuple[str, str]]] = []
 
@@ -91,7 +89,7 @@ class Model(EngineModel):
         return model_again, remember(self, self._rebuild)
 
     def __repr__(self) -> str:
-        return _overview(self)
+        return overview(self)
 
     @property
     def name(self) -> str:
@@ -168,12 +166,39 @@ class Model(EngineModel):
         prepared = self.prepare(self.vector(values) if values else self.defaults)
         return in_its_size(self.form, prepared, demand, lambda sized: self._run(prepared, initial, sized))
 
+    def prepare(self, p: Array) -> Prepared:
+        """Everything that depends on a parameter vector alone; the last one is kept."""
+        return self._prepared(p.tobytes(), lambda: Prepared(self, p))
+
+    def start(
+        self, prepared: Prepared, initial: Mapping[str, float] | None, span: tuple[float, float]
+    ) -> tuple[Array, Any]:
+        """The states (n,) at the start of a run, and what else is on its way then; without waves that is nothing.
+
+        Args:
+            prepared: the equations.
+            initial: start values, or where another motion ended; None for rest.
+            span: start and end of the run, s.
+
+        Raises:
+            SignalError: there is no such quantity.
+            ParameterError: values are not finite, contradict each other or leave something open.
+        """
+        if initial is None and not self.form.has_impulses:
+            return np.zeros(len(self.states)), None
+        after = prepared.just_after(span)
+        if isinstance(initial, Ending):
+            return prepared.taken_up(initial, after), None
+        return initial_state(prepared.bound, initial or {}, after), None
+
     def _run(self, prepared: Prepared, initial: Given, demand: Demand) -> Solution:
         x0, waves = self.start(prepared, initial, demand.span)
-        problem, bind = self.problem(prepared, x0, demand), lambda: prepared.bound
-        refuse_vanishing(self.form, bind, lambda: np.array([problem.t0]), lambda _: x0[None])
+        problem, bind = prepared.problem(x0, demand), lambda: prepared.bound
+        if self.form.doubtful:
+            refuse_vanishing(self.form, bind, lambda: np.array([problem.t0]), lambda _: x0[None])
         trajectory, name, why = self._solve(prepared, problem, demand.engine, waves)
-        refuse_vanishing(self.form, bind, lambda: trajectory.dense.steps, trajectory.dense)
+        if self.form.doubtful:
+            refuse_vanishing(self.form, bind, lambda: trajectory.dense.steps, trajectory.dense)
         return Solution(
             name=self.name,
             t=trajectory.t,
@@ -183,7 +208,7 @@ class Model(EngineModel):
             why=why,
             statistics=trajectory.statistics,
             dense=trajectory.dense,
-            observer=ModelObserver(self.form, bind, self.switching.timeline(prepared.p, *demand.span)),
+            observer=ModelObserver(self.form, bind, prepared.instants(demand.span)),
             caveat=trajectory.caveat,
         )
 
@@ -213,15 +238,7 @@ class Model(EngineModel):
         return self._steady(values, time, initial)
 
     def _steady(self, values: Mapping[str, float], t: float, initial: Given) -> SteadyState:
-        prepared = self.prepare(self.vector(values) if values else self.defaults)
-        when = t if math.isfinite(t) else self.settled(prepared.p)
-        start = initial_state(prepared.bound, initial or {}, when)
-        if not math.isfinite(t):
-            refuse_moving(prepared.bound, when, self.switching)
-        x = steady_state(prepared.bound, start, when)
-        if not math.isfinite(t):
-            warn_of_earlier_levels(prepared.bound, x, when, self.switching)
-        return SteadyState(dict(zip(self.states, x.tolist(), strict=True)), when)
+        return steady_operation(self.prepare(self.vector(values) if values else self.defaults), t, initial or {})
 
     def start_equations(self, values: Mapping[str, float]) -> BoundArrays:
         """The equations of which start values tell the states."""
@@ -282,7 +299,7 @@ class Model(EngineModel):
     def _choice(self, demand: Demand) -> tuple[str, str]:
         prepared = self.prepare(self.defaults)
         x0, _ = self.start(prepared, None, demand.span)
-        return self._engine(prepared, self.problem(prepared, x0, demand), "auto")
+        return self._engine(prepared, prepared.problem(x0, demand), "auto")
 
     def _solve(
         self,
@@ -294,7 +311,7 @@ class Model(EngineModel):
         """The run, the engine that made it, and why that one."""
         name, why = self._engine(prepared, problem, engine)
         if not self.states:
-            return at_rest(problem, self.degree), name, why
+            return without_states(problem, self.degree), name, why
         if self.form.loop_laws:
             start = start_of_loops(prepared.bound, problem)
             if name == "sundials":
@@ -312,7 +329,9 @@ class Model(EngineModel):
             return "sundials" if available("sundials") else "scipy-radau", IMPLICIT
         key = (problem.t0, problem.t_end, problem.rtol)
         for run, p, chosen in self._choices:
-            if run == key and ((p / SIMILAR < prepared.p) == (prepared.p < p * SIMILAR)).all():
+            # Parameters that differ by less than a factor of 5 suit the same engine: looking anew would cost more than
+            # the run.
+            if run == key and ((p / 5.0 < prepared.p) == (prepared.p < p * 5.0)).all():
                 return chosen
         chosen = choice.choose(problem)
         self._choices = [*self._choices[1 - VARIANTS :], (key, prepared.p, chosen)]
@@ -320,8 +339,9 @@ class Model(EngineModel):
 
     def _changes_structure(self, values: Mapping[str, float]) -> bool:
         """Whether other equations hold for new values."""
-        differs = changes_structure(self.form, values)
-        return differs or (bool(values) and self.arrays.assembly.degenerates(self.vector(values)))
+        if not values:
+            return False
+        return changes_structure(self.form, values) or self.arrays.assembly.degenerates(self.vector(values))
 
     def _checked_all(self, parameters: Mapping[str, float] | None) -> dict[str, float]:
         if parameters is None:
@@ -333,34 +353,6 @@ class Model(EngineModel):
     def _variant(self, values: Mapping[str, float]) -> Model:
         """The model of the same network with other values where these change its structure; the last few are kept."""
         return self._variants(tuple(sorted(values.items())), lambda: self._rebuild(self.netlist.with_values(values)))
-
-
-def _overview(model: Model) -> str:
-    """States, parameters with their values, and the modes of parts that change theirs."""
-    sizes = f"{counted(len(model.states), 'state')}, {counted(len(model.parameters), 'parameter')}"
-    kind = "linear" if not model.form.waves and model.linear else "nonlinear"
-    values = [f"{name} = {value:.6g}" for name, value in model.parameters.items()]
-    changing = [
-        f"{part.name}: {', '.join(dict.fromkeys(mode.words for element in part.modes for mode in element.options))}"
-        for part in model.form.graph.parts
-        if part.modes
-    ]
-    waves = [model.form.graph.part_of(end).name for end in model.form.waves[::2]]
-    lines = [
-        *named("states", model.states),
-        *named("travelling waves", waves),
-        *named("parameters", values, most=6),
-        *(
-            line
-            for text in changing[:6]
-            for line in named(text.partition(": ")[0], text.partition(": ")[2].split(", "))
-        ),
-    ]
-    return on_one_screen(
-        f"Model of '{model.name}': {sizes}, {kind if not changing else 'parts that change their mode'}",
-        lines,
-        len(lines),
-    )
 
 
 def steady_start(

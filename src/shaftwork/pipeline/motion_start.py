@@ -17,11 +17,9 @@ from shaftwork.core.notices import muted, warn
 from shaftwork.core.parameters import in_si
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.netlist import Netlist, first_few, listed
+from shaftwork.numerics.tolerances import SAME
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.results.solution import Solution
-
-SAME_TIME = 1e-12
-"""Times that differ by less than this fraction are one: units are converted."""
 
 
 class Ending(dict[str, float]):
@@ -121,7 +119,7 @@ def time_of_start(t_start: Any, initial: Any) -> Any:
     """
     if not isinstance(initial, Ending):
         return 0.0 if t_start is None else t_start
-    if t_start is not None and not math.isclose(in_si("t_start", t_start, "s"), initial.t, rel_tol=SAME_TIME):
+    if t_start is not None and not math.isclose(in_si("t_start", t_start, "s"), initial.t, rel_tol=SAME):
         raise ParameterError(
             f"t_start = {t_start} is not the time at which the motion ended that goes on, {initial.t:.9g} s. Leave "
             "t_start out; initial=sol.at([t]) goes on from a time t within the motion."

@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-import gc
 import reprlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self
 
-from shaftwork.core.errors import Diagnostic, NetworkError, NetworkWarning, ParameterError, ShaftworkError
-from shaftwork.core.notices import muted, warn
+from shaftwork.core.errors import Diagnostic, NetworkWarning, ParameterError, ShaftworkError
+from shaftwork.core.notices import muted
 from shaftwork.equations.kirchhoff import kirchhoff
 from shaftwork.equations.records import Equations, NamedPhase
 from shaftwork.formulation.diagnosis import diagnose
-from shaftwork.formulation.form import StateForm
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.netlist import Netlist, NetworkBuilder
-from shaftwork.pipeline.angles import with_angles
 from shaftwork.pipeline.arguments import Point, Time, as_names
+from shaftwork.pipeline.compiler import Compiler, sound
 from shaftwork.pipeline.model import Model
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
+    from shaftwork.analogues.analogy import Analogy
+    from shaftwork.core.domains import Domain
     from shaftwork.drawing.canvas import Drawing
     from shaftwork.frequency.analysis import SmallMotions
     from shaftwork.frequency.campbell import Campbell
@@ -31,8 +29,6 @@ if TYPE_CHECKING:
     from shaftwork.frequency.natural_modes import Modes
     from shaftwork.lagrange.lagrange import Lagrangian
 
-MOST_SHOWN = 200
-"""Parts up to which a notebook shows the drawing of a network by itself."""
 LOOP = "algebraic loop"
 """The kind of problem that `algebraic_loops="solve"` accepts."""
 
@@ -51,6 +47,9 @@ class Network(NetworkBuilder):
         2.0
     """
 
+    analogy: Analogy | None = None
+    """Of a network that `circuit` or `dual` made, what the quantities of the first network are in it."""
+
     def check(self) -> tuple[Diagnostic, ...]:
         """Everything that is wrong with the network or worth saying about it. Never raises."""
         return diagnose(self.netlist())[2]
@@ -61,7 +60,7 @@ class Network(NetworkBuilder):
         Raises:
             NetworkError: the network cannot be assembled; lists every reason.
         """
-        return _sound(self.netlist()).graph
+        return sound(self.netlist()).graph
 
     def expanded(self) -> Self:
         """The network with every long shaft written out part by part: inertias, springs and dampers of their own.
@@ -75,7 +74,7 @@ class Network(NetworkBuilder):
         from shaftwork.pipeline.expansion import expanded
 
         netlist = self.netlist()
-        return self._of(expanded(netlist, _sound(netlist).graph))
+        return self._of(expanded(netlist, sound(netlist).graph))
 
     def equations(self, *, expand: bool = False, phase: str | NamedPhase | None = None) -> Equations:
         """Kirchhoff's node and loop equations, laws, states and what was eliminated.
@@ -93,12 +92,12 @@ class Network(NetworkBuilder):
         if expand:
             return self.expanded().equations(phase=phase)
         netlist = self.netlist()
-        form = _sound(netlist)
+        form = sound(netlist)
         if not any(part.modes for part in form.graph.parts) and phase is None:
             return kirchhoff(form)
         from shaftwork.hybrid.named_phases import equations_in
 
-        return equations_in(netlist, form, "" if phase is None else phase, _sound)
+        return equations_in(netlist, form, "" if phase is None else phase, sound)
 
     def start_phase(self) -> str:
         """The phase in which a motion from rest begins, "gap open, load stuck"; empty where no part changes its mode.
@@ -238,10 +237,64 @@ class Network(NetworkBuilder):
 
         return small_motions(model, Compiler((), LOOP), every=exact)
 
+    def circuit(self) -> Network:
+        """The analogue circuit, force-current: inertias are capacitors, springs inductors, dampers resistors.
+
+        Sources are sources, gears transformers. What has no such element (brakes, gaps, motors with modes, long shafts)
+        is a part with its laws between nodes of the circuit; parts of circuits stay as they are. It is simulated to the
+        same numbers, and `circuit.analogy` tells their names.
+
+        Raises:
+            NetworkError: the network cannot be assembled; lists every reason.
+        """
+        from shaftwork.analogues.circuit import circuit
+
+        return self._of_analogy(circuit(self.netlist(), sound(self.netlist())))
+
+    def mechanical(self, domains: Mapping[str, Domain] | None = None) -> Network:
+        """The drive train of which the network is the circuit: capacitors are inertias, inductors springs, and so on.
+
+        Args:
+            domains: of nodes that do not rotate, {"rope": TRANSLATION}; what is all ELECTRICAL stays as it is. What
+                `circuit` made knows them.
+
+        Raises:
+            NetworkError: the network cannot be assembled, or a part has no counterpart, as a capacitor between two
+                nodes; lists every reason.
+        """
+        from shaftwork.analogues.mechanical import mechanical
+
+        sound(self.netlist())
+        known = {} if self.analogy is None else self.analogy.domains
+        return Network._of(mechanical(self.netlist(), {**known, **(domains or {})}))
+
+    def dual(self) -> Network:
+        """The dual circuit, force-voltage: inertias are inductors, springs capacitors, parallel is in series.
+
+        Its voltages are torques and its currents speeds. Its nodes are the meshes of the graph, which must be planar;
+        long shafts are written out first. `dual.analogy` tells names. Source: Popenda 2019, (5)-(7).
+
+        Raises:
+            NetworkError: the network cannot be assembled, a part has no dual, or the graph is not planar; lists every
+                reason.
+            ParameterError: a shaft's model is no chain of springs, as `Lumped` is.
+        """
+        from shaftwork.analogues.dual import dual
+
+        netlist = self.expanded().netlist()
+        return self._of_analogy(dual(netlist, sound(netlist)))
+
+    @staticmethod
+    def _of_analogy(analogy: Analogy) -> Network:
+        network = Network._of(analogy.netlist)
+        network.analogy = analogy
+        return network
+
     def draw(
         self,
         *,
         as_circuit: bool = False,
+        analogy: Literal["force-current", "force-voltage"] = "force-current",
         values: bool = False,
         expand: bool = False,
         phase: str | NamedPhase | None = None,
@@ -251,6 +304,8 @@ class Network(NetworkBuilder):
         Args:
             as_circuit: the analogue circuit (inertias are capacitors, compliances inductors, damping conductances,
                 gears transformers) instead of the symbols of drive trains.
+            analogy: "force-voltage" draws the dual circuit, with inertias as inductors and springs as capacitors; the
+                letters are those of the drive train, as Popenda 2019 has it.
             values: the values of parameters below their letters.
             expand: of the network with its shafts written out part by part.
             phase: a phase of the motion, as for `equations`.
@@ -260,23 +315,19 @@ class Network(NetworkBuilder):
             ParameterError: as for `equations`.
             MissingExtraError: matplotlib is not installed.
         """
-        from shaftwork.drawing.canvas import drawn
-        from shaftwork.drawing.items import Letters, circuit_items, train_items
+        from shaftwork.drawing.pictures import dual_picture, picture, refuse_analogy
 
+        refuse_analogy(analogy, as_circuit=as_circuit)
+        if analogy == "force-voltage":
+            dual, equations = self.dual(), self.equations(expand=True, phase=phase)
+            return dual_picture(equations, dual.graph(), {} if dual.analogy is None else dual.analogy.branches, values)
         equations = self.equations(expand=expand, phase=phase)
-        graph, items = equations.form.graph, circuit_items if as_circuit else train_items
-        letters = Letters(graph, equations.symbol_names, values, {} if phase is None else self._modes_in(phase))
-        return drawn(graph, tuple(items(letters)), train=not as_circuit)
-
-    def _modes_in(self, phase: str | NamedPhase) -> dict[str, str]:
-        """The mode of every part that changes its, in words."""
-        from shaftwork.hybrid.named_phases import words_of, words_of_modes
-
-        return words_of_modes(self.graph(), words_of(phase))
+        in_phase = None if phase is None else (self.graph(), phase)
+        return picture(equations, in_phase, as_circuit=as_circuit, values=values)
 
     def _repr_html_(self) -> str | None:
         """What a notebook shows; nothing but the text where the network cannot be drawn, or is too large to be read."""
-        if len(self.netlist().placed) > MOST_SHOWN:
+        if len(self.netlist().placed) > 200:
             return None
         try:
             with muted(NetworkWarning):
@@ -326,71 +377,3 @@ def network_of(network: Any) -> Network:
 def with_values(network: Network, values: Mapping[str, Any]) -> Network:
     """The network with other values of parameters, "part.parameter"; the one given stays as it is."""
     return network._of(network.netlist().with_values(values))  # noqa: SLF001 (its own)
-
-
-def _sound(netlist: Netlist, accepted: str = "") -> StateForm:
-    """The state form of a network without errors but for an accepted kind; warnings are issued."""
-    _, form, problems = diagnose(netlist)
-    if errors := tuple(problem for problem in problems if problem.severity == "error" and problem.kind != accepted):
-        raise NetworkError(f"'{netlist.name}' cannot be assembled", errors)
-    for problem in problems:
-        if problem.severity == "warning":
-            warn(str(problem), NetworkWarning)
-    assert form is not None  # noqa: S101 (only errors leave no form)
-    return form
-
-
-@dataclass(frozen=True)
-class Compiler:
-    """Makes models, with the options of `Network.compile`; a stored model is made again by it.
-
-    Args:
-        angles: parts whose angle is recorded.
-        accepted: kind of problem that is accepted.
-    """
-
-    angles: tuple[str, ...]
-    accepted: str
-
-    def __call__(self, netlist: Netlist) -> Model:
-        """The model of a network.
-
-        Raises:
-            NetworkError: it cannot be assembled.
-        """
-        with _without_collection():
-            form = _sound(netlist, self.accepted)
-            if self.angles:
-                form = with_angles(form.graph, self.angles)
-            return _kind_of_model(form, netlist)(form, netlist, self)
-
-
-def _kind_of_model(form: StateForm, netlist: Netlist) -> type[Model]:
-    """The kind of model that a network needs; that of one phase, in which modes are chosen, has no phases."""
-    if any(part.modes for part in form.graph.parts) and not any(item.choices for item in netlist.placed):
-        if form.waves:
-            from shaftwork.waves.phased_waves import PhasedWaveModel
-
-            return PhasedWaveModel
-        from shaftwork.hybrid.phased_model import PhasedModel
-
-        return PhasedModel
-    if form.waves:
-        from shaftwork.waves.wave_model import WaveModel
-
-        return WaveModel
-    return Model
-
-
-@contextmanager
-def _without_collection() -> Iterator[None]:
-    """Pause the garbage collector: an assembly makes many records that all live on, and looking through them again and
-    again makes its cost grow faster than the network (by a third at 10000 inertias).
-    """
-    running = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if running:
-            gc.enable()

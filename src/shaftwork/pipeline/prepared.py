@@ -1,10 +1,11 @@
-"""A compiled network as engines take it: all that depends on parameters alone, and the problem of one run."""
+"""A compiled network with its parameters as engines take it: the problem of a run, and the worth of its tolerances."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from functools import cache, cached_property
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import chain
 from typing import Any, NamedTuple
 
@@ -14,41 +15,97 @@ from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.array_form.recovery import BranchHistory
 from shaftwork.codegen.compiled_model import CompiledModel
-from shaftwork.codegen.start_values import initial_state
 from shaftwork.codegen.state_transfer import StateTransfer
-from shaftwork.codegen.time_switches import Switching
+from shaftwork.codegen.timeline import Timeline
 from shaftwork.codegen.undefined_laws import rough, without_value
-from shaftwork.core.calls import BoundedCache
-from shaftwork.core.errors import CompileError
+from shaftwork.core.errors import AccuracyWarning
+from shaftwork.core.notices import warn
 from shaftwork.formulation.form import StateForm
-from shaftwork.integrate.engines import available
+from shaftwork.integrate.engines import ENGINES, WAVE, too_fine
 from shaftwork.integrate.problem import Fractions, LinearInputs, Observed, Problem
 from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind
-from shaftwork.pipeline.arguments import NOMINAL, Demand
+from shaftwork.pipeline.arguments import NOMINAL, Demand, Sizes
 from shaftwork.pipeline.motion_start import Ending
+from shaftwork.results.solution import Solution
+
+HIDDEN = 10.0
+"""A state is hidden where its absolute tolerance is more than this many times its relative one at its largest."""
+ROUNDING = 1e-14
+"""Part of the size of all states together by which a step moves each of them at random."""
+ATTEMPTS = 5
+"""A motion that was hidden altogether shows its size after two or three runs."""
+ENOUGH = 64
+"""So many outputs show how large a motion is; fewer are no reason to look at the steps of heyoka, which costs a run."""
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """Everything that depends on the parameter vector alone, made once for a run of equal calls."""
+    """A model with a parameter vector: what depends on these alone, made once for a run of equal calls.
 
+    Args:
+        model: the compiled network.
+        p: (parameters,) values.
+    """
+
+    model: CompiledModel
     p: Array
-    bind: Callable[[Array], BoundArrays]
-    rhs: Callable[[float, Array], Array]
-    symbolic: Callable[[], Any]
-    linear: LinearInputs | None
-    atol: Array
-    form: StateForm
+
+    @property
+    def form(self) -> StateForm:
+        """Of the model."""
+        return self.model.form
 
     @cached_property
     def bound(self) -> BoundArrays:
         """The matrices, which many a run of compiled code can do without."""
-        return self.bind(self.p)
+        return self.model.bind(self.p)
+
+    @cached_property
+    def rhs(self) -> Callable[[float, Array], Array]:
+        """The right-hand side."""
+        scalar = self.model.scalar
+        return self.bound.rhs if scalar is None else scalar.bind(self.p)
 
     def jacobian(self, t: float, x: Array) -> Any:
         """Of the right-hand side, sparse."""
         return self.bound.jacobian(t, x)
+
+    @cached_property
+    def _taylor(self) -> Any:
+        program = self.model.taylor_program
+        return None if program is None else program.bind(self.p)
+
+    def symbolic(self) -> Any:
+        """The heyoka program with the parameters, or None where there is none."""
+        return self._taylor
+
+    @cached_property
+    def atol(self) -> Array:
+        """(n,) absolute tolerances at the usual relative one."""
+        return nominal_tolerances(self.form, self.model.arrays.assembly.coefficients(self.p))
+
+    @cached_property
+    def linear(self) -> LinearInputs | None:
+        """The linear form, where the network is linear; waves have none, as no matrix holds a delay."""
+        if not self.model.linear or self.form.waves:
+            return None
+        n, bound, straight = len(self.model.states), self.bound, self.model.degree is not None
+
+        def fractions() -> Fractions | None:
+            polynomials = bound.rational()
+            return None if polynomials is None else Fractions(*polynomials)
+
+        matrix = bound.jacobian(0.0, np.zeros(n)).tocsr()
+        return LinearInputs(matrix, lambda t: bound.rhs(t, np.zeros((n, *np.shape(t)))), fractions, straight)
+
+    def instants(self, span: tuple[float, float]) -> Timeline:
+        """The instants of a run from start to end in s at which inputs jump or bend."""
+        return self.model.switching.timeline(self.p, *span)
+
+    def just_after(self, span: tuple[float, float]) -> float:
+        """The time at which inputs are read once what jumps at the start has jumped, s."""
+        return self.instants(span).sides(span[0])[1]
 
     def taken_up(self, ending: Ending, after: float) -> Array:
         """The states (n,) that go on with what another motion stored, after what jumps at that instant.
@@ -69,120 +126,31 @@ class Prepared:
             x = np.array([ending[name] for name in names])
         return self.bound.impulse(x, ending.read, after) if self.form.has_impulses and after != ending.read else x
 
-
-class EngineModel(CompiledModel):
-    """A compiled network whose motions engines can find.
-
-    Args:
-        form: the state form.
-    """
-
-    def __init__(self, form: StateForm) -> None:
-        super().__init__(form)
-        self._prepared = BoundedCache[bytes, Prepared](1)
-
-    @cached_property
-    def switching(self) -> Switching:
-        """What switches because of the time alone."""
-        return Switching(self.form)
-
-    def settled(self, p: Array) -> float:
-        """A time in s after which no law switches any more, for a parameter vector."""
-        return max((0.0, *self.switching.known(p))) + 1.0
-
-    def prepare(self, p: Array) -> Prepared:
-        """Everything that depends on a parameter vector alone; the last one is kept."""
-        return self._prepared(p.tobytes(), lambda: self._prepare(p))
-
-    def _prepare(self, p: Array) -> Prepared:
-        scalar = self.scalar
-        return Prepared(
-            p=p,
-            bind=self.bind,
-            rhs=self.bind(p).rhs if scalar is None else scalar.bind(p),
-            symbolic=cache(lambda: None if self._program is None else self._program.bind(p)),
-            linear=self._linear_inputs(p),
-            atol=nominal_tolerances(self.form, self.arrays.assembly.coefficients(p)),
-            form=self.form,
-        )
-
-    @cached_property
-    def _program(self) -> Any:
-        """The heyoka program, where there are rows, heyoka is installed and knows every function in them."""
-        if self.rows is None or not available("heyoka"):
-            return None
-        from shaftwork.codegen.taylor.heyoka import build
-        from shaftwork.components.laws import t as time
-
-        try:
-            return build(self.rows.states, time, self.rows.parameters, self.rows.rates)
-        except CompileError:
-            return None
-
-    def _linear_inputs(self, p: Array) -> LinearInputs | None:
-        """The linear form, where the network is linear."""
-        if not self.linear:
-            return None
-        n, bound, straight = len(self.states), self.bind(p), self.degree is not None
-
-        def fractions() -> Fractions | None:
-            polynomials = bound.rational()
-            return None if polynomials is None else Fractions(*polynomials)
-
-        matrix = bound.jacobian(0.0, np.zeros(n)).tocsr()
-        return LinearInputs(matrix, lambda t: bound.rhs(t, np.zeros((n, *np.shape(t)))), fractions, straight)
-
-    def start(
-        self, prepared: Prepared, initial: Mapping[str, float] | None, span: tuple[float, float]
-    ) -> tuple[Array, Any]:
-        """The states (n,) at the start of a run, and what else is on its way then; without waves that is nothing.
-
-        Args:
-            prepared: the equations.
-            initial: start values, or where another motion ended; None for rest.
-            span: start and end of the run, s.
-
-        Raises:
-            SignalError: there is no such quantity.
-            ParameterError: values are not finite, contradict each other or leave something open.
-        """
-        if initial is None and not self.form.has_impulses:
-            return np.zeros(len(self.states)), None
-        after = self.just_after(prepared, span)
-        if isinstance(initial, Ending):
-            return prepared.taken_up(initial, after), None
-        return initial_state(prepared.bound, initial or {}, after), None
-
-    def just_after(self, prepared: Prepared, span: tuple[float, float]) -> float:
-        """The time at which inputs are read once what jumps at the start has jumped, s."""
-        return self.switching.timeline(prepared.p, *span).sides(span[0])[1]
-
-    def problem(self, prepared: Prepared, x0: Array, demand: Demand) -> Problem:
+    def problem(self, x0: Array, demand: Demand) -> Problem:
         """A run from states (n,) as an engine takes it."""
-        span, rtol = demand.span, demand.rtol
-        instants = self.switching.timeline(prepared.p, *span)
+        model, span, instants = self.model, demand.span, self.instants(demand.span)
         return Problem(
-            rhs=prepared.rhs,
-            jacobian=prepared.jacobian,
+            rhs=self.rhs,
+            jacobian=self.jacobian,
             x0=x0,
             t0=span[0],
             t_end=span[1],
-            names=self.states,
-            atol=demand.tolerances(prepared.atol, self.states),
-            rtol=rtol,
+            names=model.states,
+            atol=demand.tolerances(self.atol, model.states),
+            rtol=demand.rtol,
             overall=demand.sizes.overall,
             breakpoints=tuple(time for time in instants.stops if span[0] < time < span[1]),
-            jump=(lambda t, x: prepared.bound.impulse(x, *instants.sides(t))) if self.form.has_impulses else None,
+            jump=(lambda t, x: self.bound.impulse(x, *instants.sides(t))) if self.form.has_impulses else None,
             sides=instants.sides,
-            switches=(lambda t, x: prepared.bound.switches(t, x))  # noqa: PLW0108 (which makes the matrices)
-            if self.arrays.inputs.switching
+            switches=(lambda t, x: self.bound.switches(t, x))  # noqa: PLW0108 (which makes the matrices)
+            if model.arrays.inputs.switching
             else None,
             t_eval=demand.t_eval,
-            linear=prepared.linear,
-            observed=observed(prepared) if self.linear else None,
-            symbolic=prepared.symbolic,
-            explain=lambda t, x: without_value(prepared.bound, t, x),
-            rough=lambda t, x: rough(prepared.bound, t, x),
+            linear=self.linear,
+            observed=observed(self) if model.linear else None,
+            symbolic=self.symbolic,
+            explain=lambda t, x: without_value(self.bound, t, x),
+            rough=lambda t, x: rough(self.bound, t, x),
             max_steps=demand.max_steps,
             progress=demand.progress,
         )
@@ -199,7 +167,7 @@ class OperatingPoint(NamedTuple):
         phase: the modes of the parts, in words; empty where none changes its mode.
     """
 
-    model: EngineModel
+    model: CompiledModel
     p: Array
     time: float
     x: Array
@@ -261,3 +229,73 @@ def nominal_tolerances(form: StateForm, coefficients: Array) -> Array:
     beside = damping[[graph.branches[index].part for index in springs]]
     torques = np.maximum(np.sqrt(np.abs(coefficients[springs]) * typical), beside)
     return NOMINAL * np.concatenate([np.ones(len(inertias)), torques, np.ones(len(form.integrals))])
+
+
+def in_its_size(form: StateForm, prepared: Prepared, demand: Demand, run: Callable[[Demand], Solution]) -> Solution:
+    """A motion; where tolerances have hidden states, it is made again with those of its own size.
+
+    The absolute tolerance of a state is a part of what it is at ordinary speeds. Where it never comes near that, no
+    digit of it need be right. So what has been reached tells the sizes, and the next run has the tolerances of these.
+
+    Args:
+        form: of the equations with all that is stored.
+        prepared: their tolerances for ordinary speeds.
+        demand: what is asked of the run.
+        run: makes the motion.
+    """
+    motion = run(demand)
+    for _ in range(ATTEMPTS):
+        sizes = None if demand.atol is not None else _hidden(motion, form, demand, prepared.atol)
+        if sizes is None:
+            break
+        demand = replace(demand, sizes=sizes)
+        motion = run(demand)
+    return motion
+
+
+def _hidden(motion: Solution, form: StateForm, demand: Demand, tolerances: Array) -> Sizes | None:
+    """The sizes of a motion of which the tolerances have hidden something; None where they have not."""
+    if not ENGINES.get(motion.engine, WAVE).absolute or not motion.states:
+        return None
+    largest, rtol = _largest(motion), demand.rtol
+    overall = max(largest.values())
+    if motion.engine == "heyoka":
+        # its one tolerance is absolute while all states are below one
+        absolute = min(rtol, ENGINES["heyoka"].loosest) * demand.sizes.overall
+        return (
+            Sizes(overall=10.0 ** math.floor(math.log10(overall))) if absolute > HIDDEN * rtol * overall > 0 else None
+        )
+    reached = np.array([largest.get(state.name, 0.0) for state in form.states])
+    usual = demand.sizes.tolerances(tolerances, [state.name for state in form.states]) / NOMINAL
+    is_angle = np.array([state.kind == "integral" for state in form.states], dtype=bool)
+    ordinary = tolerances / NOMINAL
+    speed = (reached / ordinary)[~is_angle].max(initial=0.0) or (reached / ordinary).max(initial=0.0)
+    step = (demand.span[1] - demand.span[0]) / max(1, motion.statistics.get("steps", 1))
+    floor = ROUNDING / rtol * speed * ordinary * np.where(is_angle, min(1.0, step), 1.0)
+    if not ((reached > floor) & (NOMINAL * usual > HIDDEN * reached)).any():
+        return None
+    sizes = np.minimum(np.maximum(reached, floor), usual).tolist()
+    return Sizes({state.name: size for state, size in zip(form.states, sizes, strict=True)})
+
+
+def _largest(motion: Solution) -> dict[str, float]:
+    """The largest absolute value of all that is stored."""
+    enough = motion.engine == "heyoka" or len(motion.t) >= ENOUGH
+    x = motion.x if enough else motion.dense(motion.steps)
+    return dict(zip(motion.states, np.abs(x[:, : len(motion.states)]).max(axis=0).tolist(), strict=True))
+
+
+def with_accuracy(motion: Solution, demand: Demand) -> Solution:
+    """A motion that says with which tolerance it was made, where that is not the one that was asked for.
+
+    Warns:
+        AccuracyWarning: the motion has a caveat; or the engine that cannot keep the tolerance was asked for by name.
+    """
+    if motion.caveat:
+        warn(motion.caveat, AccuracyWarning)
+    told = too_fine(motion.engine, demand.rtol)
+    if not told:
+        return motion
+    if demand.engine != "auto":
+        warn(f"{told} Ask for no finer tolerance, or take another engine.", AccuracyWarning)
+    return replace(motion, why=f"{motion.why.rstrip('.')}. {told}")

@@ -1,7 +1,8 @@
-"""Laws of time in steady operation: those that never stop changing, and those that were others before they did."""
+"""Steady operation: laws of time that never stop changing, and those that were others before they did."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from operator import itemgetter
@@ -11,6 +12,8 @@ import numpy as np
 
 from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
+from shaftwork.codegen.operating import steady_state
+from shaftwork.codegen.start_values import initial_state
 from shaftwork.codegen.time_switches import Switching
 from shaftwork.codegen.undefined_laws import in_words
 from shaftwork.components.laws import t as TIME
@@ -19,6 +22,7 @@ from shaftwork.core.errors import NetworkWarning, SimulationError
 from shaftwork.core.notices import hint, warn
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import first_few
+from shaftwork.pipeline.prepared import Prepared
 
 if TYPE_CHECKING:
     from shaftwork.network.graph import CircuitGraph, GraphBranch
@@ -40,6 +44,28 @@ class SteadyState(dict[str, float]):
     def __init__(self, values: Mapping[str, float], t: float) -> None:
         super().__init__(values)
         self.t = t
+
+
+def steady_operation(prepared: Prepared, t: float, initial: Mapping[str, float]) -> SteadyState:
+    """The steady operation with laws as they are at a time in s; where that is infinite, after all their breakpoints.
+
+    Args:
+        prepared: the equations.
+        t: the time.
+        initial: start values from which it is searched.
+
+    Raises:
+        SimulationError: nothing comes to rest or to a steady speed.
+    """
+    bound, switching, after_all = prepared.bound, prepared.model.switching, not math.isfinite(t)
+    when = prepared.model.settled(prepared.p) if after_all else t
+    start = initial_state(bound, initial, when)
+    if after_all:
+        refuse_moving(bound, when, switching)
+    x = steady_state(bound, start, when)
+    if after_all:
+        warn_of_earlier_levels(bound, x, when, switching)
+    return SteadyState(dict(zip(prepared.model.states, x.tolist(), strict=True)), when)
 
 
 def refuse_moving(bound: BoundArrays, t: float, switching: Switching) -> None:

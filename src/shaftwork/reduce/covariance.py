@@ -18,11 +18,9 @@ from shaftwork.core.domains import ELECTRICAL
 from shaftwork.network.graph import resolve
 from shaftwork.network.kinds import Kind
 from shaftwork.network.templates import BranchTemplate, Template, make_template
+from shaftwork.numerics.tolerances import TYPED
 from shaftwork.reduce.kinematics import Scale
 
-POINTS = (0.37, -1.93, 41.7, 0.0083)
-"""Arguments at which laws are compared: between them they pass most limits and knees."""
-CLOSE = 1e-9
 LINEAR = (Kind.ACROSS_STORE, Kind.THROUGH_STORE, Kind.CONDUCTANCE)
 
 
@@ -124,9 +122,11 @@ def _samples(symbols: Sequence[Symbol], modes: Sequence[Modes]) -> Iterator[dict
     """Each symbol at one point after another, the numbers of modes at all that there are; time is not negative."""
     numbers = {element.symbol: tuple(dict.fromkeys(mode.value for mode in element.options)) for element in modes}
     mode_symbols = [symbol for symbol in symbols if symbol.name in numbers]
+    # Arguments at which laws are compared: between them they pass most limits and knees.
+    arguments = (0.37, -1.93, 41.7, 0.0083)
     for values in product(*(numbers[symbol.name] for symbol in mode_symbols)):
-        for first in range(len(POINTS)):
-            chosen = {symbol: POINTS[(first + k) % len(POINTS)] for k, symbol in enumerate(symbols)}
+        for first in range(len(arguments)):
+            chosen = {symbol: arguments[(first + k) % len(arguments)] for k, symbol in enumerate(symbols)}
             chosen |= dict(zip(mode_symbols, values, strict=True))
             yield {symbol: abs(value) if symbol == t else value for symbol, value in chosen.items()}
 
@@ -187,7 +187,7 @@ def _proportional(old: _PartView, new: _PartView, before: BranchTemplate, after:
 
 
 def _close(one: float, other: float) -> bool:
-    return math.isclose(one, other, rel_tol=CLOSE)
+    return math.isclose(one, other, rel_tol=TYPED)
 
 
 def _guards_agree(old: _PartView, new: _PartView, before: Modes, after: Modes) -> bool:

@@ -12,9 +12,9 @@ import numpy as np
 
 from shaftwork.components.mechanics import Inertia, PlanetaryGear, Spring
 from shaftwork.network.netlist import REFERENCE
+from shaftwork.numerics.tolerances import SAME
 from shaftwork.pipeline.network import Network
 from shaftwork.reduce.chain import Chain, Link, add_circuits, add_link, add_riders, series
-from shaftwork.reduce.kinematics import AGREE
 from shaftwork.reduce.tridiagonal_modes import Array, TridiagonalChain, constraint_mode, singular_values
 
 
@@ -92,7 +92,7 @@ def substructure(chain: Chain, count: int, number: int, inner: range) -> Substru
     damping = max(-float(losses[between]), 0.0) if len(between) > 1 else 0.0
     support = np.stack([fixed.supports @ constraints[inner], np.maximum(losses.diagonal() - damping, 0.0)], axis=1)
     beside = [chain.stations[k].inertia for k in (inner.start - 1, inner.stop) if 0 <= k < len(chain.stations)]
-    least = math.sqrt(AGREE * min(size for size in (*beside, *fixed.inertias.tolist()) if size))
+    least = math.sqrt(SAME * min(size for size in (*beside, *fixed.inertias.tolist()) if size))
     modes = tuple(_modes(fixed, constraints, between, np.array(inner), number, least))
     return Substructure(constraints, (stiffness, damping), support, between, modes)
 
@@ -184,7 +184,7 @@ def coupling_inertia(inertias: Array, between: tuple[int, ...]) -> BoundaryInert
     """What couples two boundaries, as an inertia that both carry and that leaves neither with less than nothing."""
     first, second = (max(float(inertias[k, k]), 0.0) for k in between)
     shared, largest = float(inertias[between]), math.sqrt(first * second)
-    if abs(shared) <= AGREE * inertias.max() or not largest:
+    if abs(shared) <= SAME * inertias.max() or not largest:
         return None
     parts = np.zeros(len(inertias))
     parts[list(between)] = math.sqrt(first), math.copysign(math.sqrt(second), shared)
@@ -247,7 +247,7 @@ class ModalChain:
         stations = [self.chain.stations[k] for k in self.boundaries]
         nodes = [station.node for station in stations]
         for station, size, (c, d) in zip(stations, self.ends, self.support.tolist(), strict=True):
-            if size > AGREE * self.ends.max():
+            if size > SAME * self.ends.max():
                 title = station.heaviest if station.inertias else named(f"share of {station.node}")
                 net.add(Inertia(title, J=float(size)), station.node)
             if c:
@@ -349,7 +349,7 @@ def _add_sum(net: Network, node: str, nodes: Sequence[str], shares: Array, named
     positive: so each gear has a ratio above zero. A node that turns with one other alone is that one.
     """
     pairs = [*zip(shares, nodes, strict=True), (1 - shares.sum(), REFERENCE)]
-    terms = [(float(share), each) for share, each in pairs if abs(share) > AGREE]
+    terms = [(float(share), each) for share, each in pairs if abs(share) > SAME]
     (total, here), *rest = sorted(terms, reverse=True)
     for number, (share, other) in enumerate(rest, 1):
         there = node if number == len(rest) else named(f"{node}, {number + 1} terms")

@@ -16,11 +16,6 @@ from shaftwork.core.parameters import whole
 from shaftwork.core.screen import in_columns
 from shaftwork.reduce.chain import Chain, Station, series
 
-MOST = 20_000
-"""Groupings that are tried one by one."""
-DIGITS = 13
-"""Errors that agree in so many decimals are equal: what is left is the rounding of two frequencies."""
-
 
 @dataclass(frozen=True, eq=False)
 class Grouping:
@@ -67,16 +62,18 @@ def groupings(chain: Chain, masses: int, keep: str, driven: int) -> tuple[Groupi
     fixed = _fixed(chain, masses, shaft)
     free = [k for k in range(count - 1) if k not in fixed]
     chosen = masses - 1 - len(fixed)
-    if comb(len(free), chosen) > MOST:
+    most = 20_000  # they are tried one by one
+    if comb(len(free), chosen) > most:
         raise ParameterError(
-            f"masses = {masses} of {count} inertias: {comb(len(free), chosen)} groupings are more than the {MOST} that "
+            f"masses = {masses} of {count} inertias: {comb(len(free), chosen)} groupings are more than the {most} that "
             "are tried. Take fewer masses, or simplify in two steps."
         )
     true = _swing(chain, driven, shaft)
     cuts = (tuple(sorted((*some, *fixed))) for some in combinations(free, chosen))
     measured = (_measured(chain, each, shaft, driven, true) for each in cuts)
     return tuple(
-        sorted(measured, key=lambda grouping: (round(grouping.frequency_error, DIGITS), grouping.torque_error))
+        # Errors that agree in 13 decimals are equal: the rest is the rounding of two frequencies.
+        sorted(measured, key=lambda grouping: (round(grouping.frequency_error, 13), grouping.torque_error))
     )
 
 

@@ -15,9 +15,7 @@ from shaftwork.core.errors import Diagnostic
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import listed
-
-AGREE = 1e-12
-"""A fraction that is only rounding: of two ratios round a train, of a speed or of an inertia."""
+from shaftwork.numerics.tolerances import SAME
 
 
 @dataclass(frozen=True)
@@ -61,8 +59,8 @@ class Scale:
 
     def agrees(self, other: Scale) -> bool:
         """Whether both are the same but for rounding."""
-        return math.isclose(self.ratio, other.ratio, rel_tol=AGREE) and math.isclose(
-            self.power, other.power, rel_tol=AGREE
+        return math.isclose(self.ratio, other.ratio, rel_tol=SAME) and math.isclose(
+            self.power, other.power, rel_tol=SAME
         )
 
 
@@ -303,13 +301,13 @@ def _power(term: Term, scale: Scale) -> Scale:
 
 def _shares_agree(group: Sequence[tuple[Term, Scale]]) -> bool:
     shares = [_power(term, scale).power for term, scale in group]
-    return all(math.isclose(share, shares[0], rel_tol=AGREE) for share in shares)
+    return all(math.isclose(share, shares[0], rel_tol=SAME) for share in shares)
 
 
 def _turns(group: Sequence[tuple[Term, Scale]]) -> bool:
     """Whether a row between nodes of known ratios says the same as they do."""
     parts = [term.factor * scale.ratio for term, scale in group]
-    return abs(sum(parts)) <= AGREE * sum(map(abs, parts))
+    return abs(sum(parts)) <= SAME * sum(map(abs, parts))
 
 
 def _two_ratios(row: SpeedConstraint) -> Diagnostic:
@@ -351,7 +349,7 @@ def _along(graph: CircuitGraph, part: GraphPart, shafts: Clusters) -> Iterator[D
 
 def _difference(scale: Scale, other: Scale, here: str, there: str) -> str:
     """In what two scales differ, in as many digits as it takes to see that."""
-    if not math.isclose(scale.ratio, other.ratio, rel_tol=AGREE):
+    if not math.isclose(scale.ratio, other.ratio, rel_tol=SAME):
         return f"node '{here}' turns {_unlike_one(scale.ratio / other.ratio)} times as fast as node '{there}'"
     share = _unlike_one(scale.power / other.power)
     return f"power at node '{here}' counts {share} times what it does at node '{there}'"

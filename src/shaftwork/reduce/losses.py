@@ -104,10 +104,6 @@ def _printed(frequency: float | None) -> str:
     return "lost" if frequency is None else f"${printed_number(frequency)}$"
 
 
-SHOWN = 3
-"""Differences between two networks that are named."""
-
-
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """What small models say of the torque in the kept shaft, beside what the train says.
@@ -205,7 +201,8 @@ def check_motion(before: Any, train: Network, start: float, end: float) -> None:
     pairs = {name: (there.get(name, 0.0), here.get(name, 0.0)) for name in (*here, *there)}
     differing = [f"{name} = {was:g} instead of {now:g}" for name, (was, now) in pairs.items() if was != now]
     if differing := differing or rewired(graph.wiring, before.observer.wiring):
-        shown = ", ".join([*differing[:SHOWN], *(["..."] if len(differing) > SHOWN else [])])
+        most = 3  # differences that are named
+        shown = ", ".join([*differing[:most], *(["..."] if len(differing) > most else [])])
         raise ParameterError(
             f"compare: the motion `before` is not that of '{train.name}': {shown}. Simulate the train as it is, or "
             "simplify the one that moved."

@@ -21,10 +21,6 @@ PART, FORMULA, LETTER = 20, 42, 2
 """Width of the names of parts, that of the formulas and about that of a letter in print, mm."""
 MOTION = {omega.name: r"\omega", phi.name: r"\varphi", v.name: "v", s.name: "s"}
 """What laws read, of their own shaft."""
-POINTS = 12
-"""Points of a table that are printed; of a longer one the first."""
-SCRIPT = 0.75
-"""Size of what is in a fraction beside text."""
 TIMES, BREAKS = r" \, ", r" \,\allowbreak "
 """Between factors; where a line may end."""
 
@@ -89,7 +85,8 @@ class ReductionPrint:
         fraction = rf"\frac{{{TIMES.join(upper)}}}{{{TIMES.join(lower)}}}"
         if not lower:
             law = BREAKS.join(upper)
-        elif SCRIPT * printed_width(fraction) <= FORMULA / LETTER:
+        # letters of a fraction beside text are smaller
+        elif 0.75 * printed_width(fraction) <= FORMULA / LETTER:
             law = fraction
         else:
             divisor = BREAKS.join(lower)
@@ -118,7 +115,8 @@ def _pieces(law: Expr, names: Mapping[str, str]) -> tuple[str, ...]:
     """The right side of a law, in pieces between which it may be broken."""
     if isinstance(law, Table):
         points = [f"({printed_number(x)},\\, {printed_number(y)})\\," for x, y in zip(law.xs, law.ys, strict=True)]
-        return (*points[:POINTS], *([r"\dots"] if len(points) > POINTS else []))
+        most = 12  # points of a table that are printed
+        return (*points[:most], *([r"\dots"] if len(points) > most else []))
     return Writer(names, (), (), {}).pieces((FactoredTerms(Integer(1), Add.make_args(law)),))
 
 

@@ -18,8 +18,6 @@ from shaftwork.reduce.kinematics import Kinematics, Scale, kinematics
 from shaftwork.reduce.referred_parts import Entry, ReferredPart, formula_of, referred_part
 
 HEADINGS = ("part", "quantity", "value", "unit", "ratio", "referred", "unit", "formula")
-WIDEST = 28
-"""Characters of a law in the text; a longer one is cut."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +74,8 @@ def _text(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.6g}"
     shown = str(value)
-    return shown if len(shown) <= WIDEST else f"{shown[: WIDEST - 4]} ..."
+    widest = 28  # characters
+    return shown if len(shown) <= widest else f"{shown[: widest - 4]} ..."
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,9 +26,6 @@ from shaftwork.results.solution import Solution
 
 KEPT = 0.05
 """A natural frequency is kept when the small model has it within this fraction."""
-AMPLIFIED = 0.1
-"""Up to where a lost mode would swing along by no more than this fraction, the small model is valid."""
-POINTS = 4001
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +78,8 @@ class Simplified:
         17 %. What parts `by_angle` hold is not in it.
         """
         lost = (row.before for row in self.frequencies if row.error is None or abs(row.error) > KEPT)
-        return next(lost, math.inf) * math.sqrt(AMPLIFIED / (1 + AMPLIFIED))
+        amplified = 0.1  # a lost mode swings along by this part at most
+        return next(lost, math.inf) * math.sqrt(amplified / (1 + amplified))
 
     def compare(
         self, t_end: float, *, before: Solution | None = None, modes: bool = True, **options: Any
@@ -108,7 +106,7 @@ class Simplified:
         refuse_changes(options)
         start = options.get("t_start", 0.0)
         if before is None:
-            before = self.train.simulate(end, **{"t_eval": np.linspace(start, end, POINTS), **options})
+            before = self.train.simulate(end, **{"t_eval": np.linspace(start, end, 4001), **options})
         else:
             check_motion(before, self.train, start, end)
         options |= {"t_eval": before.t}

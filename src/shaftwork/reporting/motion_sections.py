@@ -78,10 +78,11 @@ def extremes(subject: Subject) -> str:
     for name in names:
         least, most, mean, end = solution.extremes.row(name)
         values = (number(least), number(least.t, 4), number(most), number(most.t, 4), number(mean), number(end))
-        rows.append((f"{breakable(name)} in {unit(least.unit)}", *values))
+        part, _, quantity = name.rpartition(".")
+        rows.append((rf"{breakable(part)}.\allowbreak {breakable(quantity)} in {unit(least.unit)}", *values))
     said = "Extremes are those of the motion itself, searched between the output times, on both sides of every jump."
     heads = ("Quantity", "Minimum", "at s", "Maximum", "at s", "Mean", "End")
-    return paragraphs(in_text(said), columns(heads, rows, (4.6, 4.25, 2.9, 4.25, 2.9, 4.25, 4.25)))
+    return paragraphs(in_text(said), columns(heads, rows, (4.4, 4.25, 3.1, 4.25, 3.1, 4.15, 4.15)))
 
 
 def energy(subject: Subject) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -9,8 +10,8 @@ from typing import TYPE_CHECKING
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import ModelFileError
 from shaftwork.equations.spelling import in_text, without_marks
-from shaftwork.latex.document import blocks_of, section
-from shaftwork.latex.nomenclature import breakable, laws, parameters, variables
+from shaftwork.latex.document import section
+from shaftwork.latex.nomenclature import breakable, condensed, laws, parameters, variables
 from shaftwork.modelfiles.storage import netlist_text
 from shaftwork.network.netlist import REFERENCE
 from shaftwork.reporting.latex_parts import columns, listed, paragraphs, picture
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from shaftwork.latex.blocks import Block
     from shaftwork.reporting.subject import Subject
 
+COLUMNS = 82
+"""Letters of a line of the model file, which a page has room for."""
 MOST_DRAWN = 60
 """Parts up to which a drawing can be read on a page."""
 
@@ -69,7 +72,7 @@ def assumptions(subject: Subject) -> str:
 def equations(subject: Subject) -> str:
     """Kirchhoff's equations and the state form, phase by phase; laws stand once, where they first hold."""
     printed: set[tuple[str, str]] = set()
-    texts = [_of_phase(equations, printed) for equations in subject.equations]
+    texts = [_of_phase(blocks.equations, new, printed) for blocks, new in subject.printed]
     several = len(subject.printed_phases) < len(subject.durations)
     said = [
         f"The motion has {len(subject.durations)} combinations of modes; those that last longest are printed."
@@ -83,11 +86,12 @@ def equations(subject: Subject) -> str:
     return paragraphs(in_text(" ".join(filter(None, said))), *texts)
 
 
-def _of_phase(equations: Equations, printed: set[tuple[str, str]]) -> str:
-    blocks = tuple(_new(blocks_of(equations, None, values=False), printed))
+def _of_phase(equations: Equations, blocks: tuple[Block, ...], printed: set[tuple[str, str]]) -> str:
+    blocks = tuple(_new(blocks, printed))
     if not equations.phase:
         return section(blocks)
-    states = ", ".join(f"${equations.symbol_names[state.name]}$" for state in equations.form.states) or "none"
+    names = condensed([(f"${equations.symbol_names[state.name]}$",) for state in equations.form.states])
+    states = ", ".join(name for (name,) in names) or "none"
     title = f"\\subsection{{{in_text(equations.phase)}}}"
     return paragraphs(title, without_marks(f"States: {states}."), section(blocks))
 
@@ -104,13 +108,9 @@ def _new(blocks: tuple[Block, ...], printed: set[tuple[str, str]]) -> Iterator[B
 def nomenclature(subject: Subject) -> str:
     """The variables of all printed equations with their units."""
     states = {state.name: "state" for equations in subject.equations for state in equations.form.states}
-    used = {
-        symbol.name
-        for equations in subject.equations
-        for row in equations.rows
-        for symbol in row.left.free_symbols | row.right.free_symbols
-    }
-    return variables(subject.equations, used | states.keys(), states)
+    used = {*(name for blocks, _ in subject.printed for name in blocks.used), *states}
+    helpers = tuple(row for blocks, _ in subject.printed for row in blocks.helpers())
+    return variables(subject.equations, used, states, helpers=helpers)
 
 
 def model_file(subject: Subject) -> str:
@@ -120,4 +120,7 @@ def model_file(subject: Subject) -> str:
     except ModelFileError as reason:
         subject.notes.append(f"There is no model file: {reason}")
         return ""
-    return f"\\begin{{verbatim}}\n{text.rstrip()}\n\\end{{verbatim}}"
+    lines = [part for line in text.rstrip().splitlines() for part in textwrap.wrap(line, COLUMNS) or [""]]
+    said = "" if len(lines) == len(text.rstrip().splitlines()) else "Lines that are too long for the page are wrapped."
+    body = "\n".join(lines)
+    return paragraphs(said, f"\\begin{{verbatim}}\n{body}\n\\end{{verbatim}}")

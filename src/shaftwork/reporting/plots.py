@@ -10,7 +10,7 @@ from shaftwork.results.plotting import curve, grouped
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
-    from shaftwork.reporting.document import Report
+    from shaftwork.reporting.report import Report
 
 HEIGHT = 220
 """Of an axis, pixels."""

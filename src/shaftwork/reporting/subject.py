@@ -8,6 +8,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from shaftwork.equations.records import Equations
+from shaftwork.latex.blocks import Block, Blocks
+from shaftwork.latex.document import printed_blocks
 from shaftwork.pipeline.arguments import Point
 from shaftwork.pipeline.network import Network
 from shaftwork.results.fatigue import SNLine
@@ -68,6 +70,12 @@ class Subject:
     def equations(self) -> tuple[Equations, ...]:
         """Of the phases that are printed, in their order; of a network without phases its only ones."""
         return tuple(self.network.equations(phase=phase or None) for phase in self.printed_phases)
+
+    @cached_property
+    def printed(self) -> tuple[tuple[Blocks, tuple[Block, ...]], ...]:
+        """What is printed of them, with what knows the letters in it."""
+        of_phases = [Blocks(equations, values=False) for equations in self.equations]
+        return tuple((blocks, printed_blocks(blocks, None)) for blocks in of_phases)
 
     @cached_property
     def printed_phases(self) -> tuple[str, ...]:

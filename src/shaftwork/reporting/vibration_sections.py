@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from shaftwork.core.errors import ShaftworkError
 from shaftwork.equations.spelling import in_text
 from shaftwork.latex.nomenclature import breakable
-from shaftwork.reporting.latex_parts import columns, number, paragraphs, picture
+from shaftwork.reporting.latex_parts import columns, listed, number, paragraphs, picture
 
 if TYPE_CHECKING:
     from shaftwork.reporting.subject import Subject
 
+HOLZER_MODES = 3
+"""Modes in tables of their own, the lowest."""
 MOST_MODES = 30
 """Modes in the table, the lowest."""
 
@@ -51,9 +53,50 @@ def campbell(subject: Subject) -> str:
     return paragraphs(picture("campbell", "Campbell diagram"), columns(heads, rows, (2, 1, 2, 3)))
 
 
-def torsional(subject: Subject) -> str:  # noqa: ARG001 (until there is a calculation)
-    """The torsional vibration calculation."""
-    return ""
+def torsional(subject: Subject) -> str:
+    """The torsional calculation: vibratory torques and stresses with their limits, barred speeds, modes, heat."""
+    calculation = subject.torsional
+    if calculation is None:
+        return ""
+    judged = [name for name, shaft in calculation.items() if shaft.limits is not None]
+    subject.figures["torsional"] = calculation.plot(*judged)
+    rows = [tuple(map(in_text, row)) for row in calculation.table]
+    heads = ("Shaft", "Torque in kN m", "at 1/min", "Order", r"Stress in N/mm$^2$", r"$\tau_c$", "Verdict")
+    barred = [f"{shaft.shaft}: {one}" for shaft in calculation.values() for one in shaft.barred]
+    rule = (
+        "The torque is half of peak to peak over a cycle, from all orders with their phases. Stresses are nominal; "
+        "permitted ones are those of IACS UR M68."
+    )
+    return paragraphs(
+        in_text(f"{calculation.heading}. {rule}"),
+        columns(heads, rows, (4, 2.5, 2.5, 1.6, 2.5, 2, 4)),
+        listed(barred),
+        picture("torsional", "Vibratory stress or torque over the speed, with the permitted stresses"),
+        *map(_holzer, calculation.modes[:HOLZER_MODES]),
+        _heat(calculation),
+    )
+
+
+def _holzer(mode: Any) -> str:
+    """A mode as Holzer's table: amplitudes and torques of the masses, torques and stresses of the shafts."""
+    title = f"{mode.name}: {mode.frequency:.5g} Hz, damping {mode.damping:.3g}, for 1 rad of {mode.measure}"
+    masses = [(breakable(one.name), number(one.amplitude), number(one.torque / 1e3)) for one in mode.masses]
+    shafts = [
+        (breakable(one.name), number(one.torque / 1e3), "--" if one.stress is None else number(one.stress / 1e6))
+        for one in mode.shafts
+    ]
+    return paragraphs(
+        f"\\subsection{{{in_text(title)}}}",
+        columns(("Mass", "Amplitude", "Torque in kN m"), masses, (4, 3, 3)),
+        columns(("Shaft", "Torque in kN m", r"Stress in N/mm$^2$"), shafts, (4, 3, 3)),
+    )
+
+
+def _heat(calculation: Any) -> str:
+    """What parts turn into heat, at the speed at which each does most."""
+    most = {part: float(power.max()) for part, power in calculation.power_lost.items()}
+    rows = [(breakable(part), number(power)) for part, power in most.items() if power > 0.0]
+    return columns(("Heat of the vibration in", "W, at most"), rows, (3, 2))
 
 
 def shaft_models(subject: Subject) -> str:

@@ -13,7 +13,7 @@ from shaftwork.drawing.canvas import Drawing
 from shaftwork.reporting.plots import plots
 
 if TYPE_CHECKING:
-    from shaftwork.reporting.document import Report
+    from shaftwork.reporting.report import Report
 
 EXTRA = "report"
 INCLUDED = re.compile(r"\\includegraphics\[[^]]*\]\{([^}]*)\}")

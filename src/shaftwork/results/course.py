@@ -22,16 +22,12 @@ from shaftwork.results.observer import Array, Read, blocks
 
 NODES, WEIGHTS = lobatto_rule(7)
 """Of Lobatto's rule, which reads both ends: there peaks are, and a jump close to an end is not overlooked."""
-LEAST = 64
-"""Panels of a run at least: an exact engine has few steps."""
 TIGHT = 1e-13
 """Change of an integral by parting all panels that is none, as a fraction of the integral of the integrand's size."""
 MOST_INTEGRATED = 100_000
 """Panels of an integral; a motion that asks for more, such as torque of mere noise, is integrated as far as that."""
 SHARE = 0.41
 """Of a panel is the first of its two parts: of a jump in the middle, halves and the whole would say the same."""
-NOISE, FALLS, GROWS = 1e-9, 0.75, 1.5
-"""Changes below the first fraction are noise where parting leaves this share of them, and so many times the panels."""
 ROUGH, FINE, EVEN = 1e-3, 1e-9, 1e-6
 """Of the range: what a polynomial may miss anywhere, where it may hold an extreme, and where all turns are wanted.
 
@@ -45,16 +41,10 @@ ROUNDINGS = 100 * float(np.finfo(float).eps)
 """Of the largest value: what rounding alone makes a polynomial miss."""
 SHORTEST = 16
 """Rounding units of time: a panel so short holds a jump, and its ends are the two sides of it."""
-MOST = 2_000_000
-"""Panels of a course, which take 128 MB; where a motion asks for more, as mere noise does, the rest stays rough."""
 LOOKS = chebyshev_nodes(32)
 """Where in a panel, from -1 to 1, its polynomial is looked at."""
-NEWTON = 5
-"""Steps to a turn between two looks."""
 SMALLEST = 1e-6
 """Ups and downs of less than this part of the range make no peak, where nobody says otherwise."""
-LATER = 1e-3
-"""A peak that is higher by this fraction of what counts as a change is no later one."""
 
 Mask = NDArray[np.bool_]
 _RATES = to_slopes(NODES, NODES)
@@ -181,7 +171,7 @@ def integrate(
         alike: whether the quantities are of one kind: what is little beside the largest need not be known better.
         size: the largest integral of a size over what was before, beside which it need not be known better either.
     """
-    least = max(1, LEAST // len(steps))
+    least = max(1, 64 // len(steps))  # panels of a step: an exact engine has few steps
     edges = np.append((steps[:-1, None] + np.diff(steps)[:, None] * np.arange(least) / least).ravel(), steps[-1])
     panels = rule.between(edges)
     shortest = SHORTEST * np.spacing(np.abs(steps).max())
@@ -197,7 +187,8 @@ def integrate(
         scale = scale.max(axis=0, keepdims=True, initial=0.0) if alike else scale
         rough, open_ = float((change / scale).sum(axis=1).max(initial=0.0)), len(panels.start)
         count += 2 * open_
-        noisy = FALLS * before[0] < rough <= NOISE and open_ > GROWS * before[1]
+        # Small changes are noise where parting leaves three quarters of them, in half as many panels again.
+        noisy = 0.75 * before[0] < rough <= 1e-9 and open_ > 1.5 * before[1]
         done = (change <= TIGHT * scale / first).all(axis=0) | (panels.length <= shortest)
         if rough <= TIGHT or count > MOST_INTEGRATED or noisy:
             done[:] = True
@@ -285,7 +276,8 @@ def course(read: Read, steps: Array, *, even: bool = False) -> Course:
         rough = miss > (EVEN if even else ROUGH) * size
         if not even:
             rough |= (miss > FINE * size) & _may_hold_extremes(values, low, high)
-        parted = np.flatnonzero(rough & (panels.length > shortest) & (count < MOST))
+        # Two million panels take 128 MB; where a motion asks for more, as mere noise does, the rest stays rough.
+        parted = np.flatnonzero(rough & (panels.length > shortest) & (count < 2_000_000))
         parted = parted[miss[parted] > SHAKES * _noise(read, panels.taken(parted))]
         settled.append((panels.taken(np.delete(np.arange(len(values)), parted)), np.delete(values, parted, axis=0)))
         if not len(parted):
@@ -329,7 +321,7 @@ def _turns(values: Array, low: Array, high: Array) -> Array:
     def slopes(chosen: Chosen, places: Array) -> tuple[Array, Array]:
         return at(slope[chosen], places), at(bend[chosen], places)
 
-    return zeros(slopes, low, high, rising=at(slope, low) <= 0, iterations=NEWTON)
+    return zeros(slopes, low, high, rising=at(slope, low) <= 0, iterations=5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -368,7 +360,8 @@ def _peaks_and_valleys(values: Array, smallest: float) -> NDArray[np.intp]:
     for k in [*extremes.tolist(), len(values) - 1]:
         step = values[k] - values[reached]
         if reached != turns[-1] and step * (values[reached] - values[turns[-1]]) >= 0:
-            reached = k if abs(step) > LATER * smallest else reached
+            # a peak that is higher by less than a thousandth of a change is no later one
+            reached = k if abs(step) > 1e-3 * smallest else reached
         elif abs(step) > smallest:
             if reached:
                 turns.append(reached)

@@ -10,24 +10,16 @@ import numpy as np
 
 from shaftwork.core.errors import AccuracyWarning
 from shaftwork.core.notices import warn
+from shaftwork.numerics.tolerances import GOLDEN
 from shaftwork.results.course import course
 from shaftwork.results.observer import Array, Reader
 
-SHOWN = 20
-"""Quantities in the table of all."""
 HIDDEN, STRAYED = 0.05, 0.2
 """Of the largest value: what samples may miss of an extreme, and the root mean square by which lines between samples
 may miss the quantity. Seven samples in a swing miss a twentieth of it."""
-LEAST = 50
-"""Fewer output times are a list of moments, of which nobody expects extremes."""
-LOOKS, MOST_LOOKS, MOST_VALUES = 4, 30_000, 1_000_000
-"""Times between two neighbours of the outputs and steps, and in all, at which quantities are looked at; values of all
-that is read there, beyond which there are fewer times."""
-SHARES = np.arange(1, 9) * (np.sqrt(5) - 1) / 2 % 1
+SHARES = np.arange(1, 9) * GOLDEN % 1
 """Where between its neighbours a time lies: in step with nothing that swings, and few, for engines that take as many
 matrix exponentials as there are distances from a step end."""
-NARROWEST, OFFSETS = 1e-6, 100
-"""Of the time between two samples, how wide a turn is at least; at so many distances from it that is looked for."""
 MOST_OUTPUTS = 10_000_000
 """Output times that can be asked for."""
 
@@ -143,8 +135,9 @@ class Extremes(Mapping[str, tuple[Extreme, Extreme]]):
 
     def __str__(self) -> str:
         names = tuple(self)
-        more = [f"and {len(names) - SHOWN} more"] if len(names) > SHOWN else []
-        return "\n".join([f"'{self._reader.title}'", self.table(names[:SHOWN]), *more])
+        count = 20  # quantities in the table of all
+        more = [f"and {len(names) - count} more"] if len(names) > count else []
+        return "\n".join([f"'{self._reader.title}'", self.table(names[:count]), *more])
 
     __repr__ = __str__
 
@@ -160,7 +153,7 @@ def warn_of_coarse_samples(reader: Reader, t: Array, x: Array, names: Sequence[s
         x: (k, n) states at these times.
         names: of the quantities; by default those of the states.
     """
-    if len(t) < LEAST:
+    if len(t) < 50:  # a list of moments, of which nobody expects extremes
         return
     names = names or tuple(name for name in reader.states if name in reader.observer.units)
     if (worst := _worst_shown(reader, t, x, names)) is not None:
@@ -171,7 +164,8 @@ def _worst_shown(reader: Reader, t: Array, x: Array, names: Sequence[str]) -> tu
     """What samples show worst of some quantities: name, place and time in s; None where they show all of them."""
     times, first = np.unique(t, return_index=True)
     width = len(reader.states) + sum(len(reader.numbers(name)) for name in names)
-    between = _looks(times, reader.steps, min(MOST_LOOKS, MOST_VALUES // max(1, width)))
+    # At most 30 000 times are looked at, and fewer where more than a million values would be read.
+    between = _looks(times, reader.steps, min(30_000, 1_000_000 // max(1, width)))
     states = reader.dense(between)
     worst, where = 1.0, None
     for name in names:
@@ -195,7 +189,7 @@ def _looks(times: Array, steps: Array, most: int) -> Array:
     edges = np.unique(np.append(times, steps[(steps > times[0]) & (steps < times[-1])]))
     if len(edges) > most:
         edges = edges[np.linspace(0, len(edges) - 1, most).astype(int)]
-    each = int(np.clip(most // len(edges), 1, LOOKS))
+    each = int(np.clip(most // len(edges), 1, 4))
     shares = (np.arange(each) + np.resize(SHARES, len(edges) - 1)[:, None]) / each
     return np.asarray((edges[:-1, None] + np.diff(edges)[:, None] * shares).ravel())
 
@@ -222,7 +216,8 @@ def _message(reader: Reader, t: Array, x: Array, name: str, place: int, near: fl
     which = int(np.argmax([abs(value - line) for (_, value), line in zip(turns, lines, strict=True)]))
     (when, value), line = turns[which], lines[which]
     room, width = HIDDEN * max(abs(value), -low, high), 0.0
-    offsets = np.geomspace(NARROWEST, 1.0, OFFSETS) * (end - start)
+    # a turn is no narrower than a millionth of the time between two samples
+    offsets = np.geomspace(1e-6, 1.0, 100) * (end - start)
     for side in (-1, 1):
         aside = np.clip(when + side * offsets, reader.steps[0], reader.steps[-1])[::side]
         stays = np.abs(read(aside)[::side] - value) <= room

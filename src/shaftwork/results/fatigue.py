@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 BINS = 24
-SHOWN = 12
-"""Cycles in the printed table."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,11 +119,12 @@ class Rainflow:
         head = f"{self.name} in '{self.title}': {cycles:g} cycles in {self.duration:g} s"
         if not len(self):
             return head
+        most = 12  # cycles in the table
         lines = [f"{'range in ' + self.unit:>14}  {'mean':>12}  {'count':>5}  {'from s':>10}  {'to s':>10}"]
-        for k in np.argsort(-self.range, kind="stable")[:SHOWN].tolist():
+        for k in np.argsort(-self.range, kind="stable")[:most].tolist():
             row = f"{self.range[k]:>14.6g}  {self.mean[k]:>z12.6g}  {self.count[k]:>5g}"
             lines.append(f"{row}  {self.start[k]:>10.6g}  {self.end[k]:>10.6g}")
-        more = len(self) - SHOWN
+        more = len(self) - most
         return "\n".join([f"{head}, the largest of them:", *lines, *([f"and {more} smaller"] if more > 0 else [])])
 
 

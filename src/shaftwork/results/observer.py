@@ -10,34 +10,26 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from shaftwork.core.errors import AccuracyWarning, SignalError, no_quantity
+from shaftwork.core.errors import AccuracyWarning, ParameterError, SignalError, no_quantity
 from shaftwork.core.notices import muted, warn
-from shaftwork.core.parameters import numbers_in_si
+from shaftwork.core.parameters import in_si, numbers_in_si
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 RPM = 30 / np.pi
 """1/min of a rad/s."""
-AT_ONCE = 4_000_000
-"""Numbers that are read of a motion at once, 32 MB."""
 Read = Callable[[Array], Array]
 """From ascending times (k,) to the values of a quantity there."""
 ASIDE = (1e-13, 1e-11, 1e-9, 1e-7, 1e-6)
 """How far aside a value is looked for, of the time or of 1 s, and of a shorter run of that."""
-SAME = 1e-4
-"""A value that is the same but for this fraction of it at twice the distance is what the quantity goes to, to so many
-digits; one that falls as a power of the distance goes to zero where what that power leaves is below this fraction."""
-SLOWEST = 0.95
-"""Of a difference is left at half the distance, at most, where a power of the distance falls: the 13th root leaves so
-much, and what falls more slowly cannot be told from a pole of the logarithm."""
 ANGLES = ("phi", "s", "psi")
 """Integrals of speeds and voltages, which are recorded when asked for."""
 
 
 def blocks(count: int, width: int) -> Iterator[slice]:
     """Places 0 to `count` in blocks, of as many as are read at once where each holds `width` numbers."""
-    rows = max(1, AT_ONCE // max(1, width))
+    rows = max(1, 4_000_000 // max(1, width))  # numbers in 32 MB
     return (slice(first, min(first + rows, count)) for first in range(0, count, rows))
 
 
@@ -283,6 +275,22 @@ class Reader:
             )
 
 
+def span_of(reader: Reader, start: float | None, end: float | None) -> tuple[float, float]:
+    """Start and end of a span of a motion, s.
+
+    Raises:
+        ParameterError: they are none.
+    """
+    begins, ends = float(reader.steps[0]), float(reader.steps[-1])
+    first = begins if start is None else in_si("start", start, "s")
+    last = ends if end is None else in_si("end", end, "s")
+    if not begins <= first < last <= ends:
+        raise ParameterError(
+            f"start = {first:g} s, end = {last:g} s: give a span within the motion, from {begins:g} to {ends:g} s."
+        )
+    return first, last
+
+
 def beside(read: Callable[[Array], Array], times: Array, steps: Array) -> tuple[Array, Array]:
     """What a quantity goes to on the side of its step at times at which it has no finite value.
 
@@ -309,10 +317,14 @@ def beside(read: Callable[[Array], Array], times: Array, steps: Array) -> tuple[
             values[-1][order] = read(aside[order])
         with np.errstate(invalid="ignore", divide="ignore"):
             left = (values[1] - values[0]) / (values[2] - values[1])  # of each difference at half the distance
-            falls = (left > 0) & (left < SLOWEST)
+            # The 13th root leaves so much; what falls more slowly cannot be told from a pole of the logarithm.
+            falls = (left > 0) & (left < 0.95)
             goes_to = np.where(falls, values[0] - (values[1] - values[0]) * left / (1 - left), values[0])
-            settles = np.isnan(limit) & (np.abs(values[0] - values[1]) <= SAME * np.abs(values[0]))
-            vanishes = np.isnan(limit) & falls & (np.abs(goes_to) <= SAME * np.abs(values[0]))
+            # A value that is the same to four digits at twice the distance is what the quantity goes to; one that falls
+            # as a power of the distance goes to zero where what that power leaves is below this part of it.
+            same = 1e-4
+            settles = np.isnan(limit) & (np.abs(values[0] - values[1]) <= same * np.abs(values[0]))
+            vanishes = np.isnan(limit) & falls & (np.abs(goes_to) <= same * np.abs(values[0]))
         limit[settles] = goes_to[settles]
         limit[vanishes] = 0.0
         empty = np.isnan(near) & np.isfinite(values[0])

@@ -18,14 +18,6 @@ if TYPE_CHECKING:
 
 POINTS = 2000
 """Points of a curve besides those where it turns: more than a screen has."""
-MOST_DRAWN = 20_000
-"""Points of a curve beyond which only the lowest and the highest of what falls on the same place are drawn."""
-ALIKE = 10.0
-"""Curves whose largest values differ by more than this factor have axes of their own: the smaller would look flat."""
-MARKED = 60
-"""Changes of mode up to which each is a line across the curves; more would hide them, and the phases show them too."""
-HEIGHT, STRIP = 2.4, 0.3
-"""Inches of an axis, and of a row of phases."""
 
 Curve = tuple[Array, Array]
 """Times (k,) and values (k,) or, along a part, (k, places)."""
@@ -74,12 +66,13 @@ def plot_signals(
     curves = {name: curve(reader, name) for name in units}
     groups = grouped(curves, units)
     parts = tuple(phases[0].modes) if len(phases) > 1 else ()
-    heights = [HEIGHT] * len(groups) + ([STRIP * (len(parts) + 1)] if parts else [])
+    # inches: of an axis, and of a row of phases
+    heights = [2.4] * len(groups) + ([0.3 * (len(parts) + 1)] if parts else [])
     figure = new_figure("Solution.plot()", 9.0, 1.2 + sum(heights), reader.title)
     axes = np.atleast_1d(figure.subplots(len(heights), 1, sharex=True, gridspec_kw={"height_ratios": heights}))
     for axis, (unit, members) in zip(axes, groups, strict=False):
         _draw(axis, unit, {name: curves[name] for name in members})
-        if len(events) <= MARKED:
+        if len(events) <= 60:  # more lines would hide the curves, and the phases show the changes too
             for time, *_ in events:
                 axis.axvline(time, color="0.75", linewidth=0.6, zorder=0)
     if parts:
@@ -100,7 +93,8 @@ def curve(reader: Reader, name: str) -> Curve:
     times, values = np.append(turning, even), np.append(values, read(even))
     order = np.argsort(times, kind="stable")
     times, values = times[order], values[order]
-    return (times, values) if len(times) <= MOST_DRAWN else _envelope(times, values)
+    # Of more points only the lowest and the highest of what falls on the same place are drawn.
+    return (times, values) if len(times) <= 20_000 else _envelope(times, values)
 
 
 def _envelope(times: Array, values: Array) -> Curve:
@@ -120,7 +114,8 @@ def grouped(curves: Mapping[str, Curve], units: Mapping[str, str]) -> list[tuple
     groups: list[tuple[str, list[str]]] = []
     for name in sorted(sizes, key=lambda name: -sizes[name]):
         for unit, members in groups:
-            if unit == units[name] and (sizes[members[0]] <= ALIKE * sizes[name] or sizes[name] == 0.0):
+            # beside a curve ten times as large it would look flat
+            if unit == units[name] and (sizes[members[0]] <= 10.0 * sizes[name] or sizes[name] == 0.0):
                 members.append(name)
                 break
         else:

@@ -10,15 +10,17 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
-from shaftwork.core.errors import AccuracyWarning, SignalError, imported
+from shaftwork.core.errors import AccuracyWarning, SignalError
+from shaftwork.core.notebook import html_table
 from shaftwork.core.notices import warn
 from shaftwork.core.screen import counted, named, on_one_screen
 from shaftwork.integrate.problem import TOLERATED, UNSURPRISING
 from shaftwork.results.course import SMALLEST
+from shaftwork.results.data_frames import to_pandas, to_xarray
 from shaftwork.results.energy import EnergyBalance, energy_balance
 from shaftwork.results.extremes import Extreme, Extremes, warn_of_coarse_samples
 from shaftwork.results.fatigue import Damage, Rainflow, SNLine, damage_of, damages, load_cycles
-from shaftwork.results.observer import Array, DenseStates, Observer, PhaseRow, Reader, array_in_si
+from shaftwork.results.observer import Array, DenseStates, Observer, PhaseRow, Reader, array_in_si, span_of
 from shaftwork.results.plotting import plot_signals
 
 if TYPE_CHECKING:
@@ -26,10 +28,12 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
+    from shaftwork.animation.animation import Animation
+    from shaftwork.spectra.order_spectra import OrderSpectra
+    from shaftwork.spectra.spectrum import Spectrum
+
 COMPILED = ("dense", "observer")
 """What of a motion holds compiled code."""
-ALIKE = 1e-6
-"""Two runs of one motion at the usual tolerance differ by less of the largest value of a state."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +114,8 @@ class Solution:
         inside = np.append(self.t[1:] != self.t[:-1], True)  # of two sides the later one
         off = np.abs(motion.dense(self.t[inside]) - self.x[inside]).max(axis=0)
         share = float((off / np.maximum(np.abs(self.x).max(axis=0), np.finfo(float).tiny)).max())
-        if share > ALIKE:
+        # Two runs of one motion at the usual tolerance differ by less of the largest value of a state.
+        if share > 1e-6:
             warn(
                 f"The stored motion of '{self.name}' was made again to be read, by other versions or on another "
                 f"machine: its states differ by up to {share:.1e} of their largest value.",
@@ -192,11 +197,7 @@ class Solution:
         return self.extremes[name][1]
 
     def min(self, name: str) -> Extreme:
-        """The smallest value of a quantity, as `max`.
-
-        Raises:
-            SignalError: there is no such quantity.
-        """
+        """The smallest value of a quantity, as `max`."""
         return self.extremes[name][0]
 
     @cached_property
@@ -219,7 +220,7 @@ class Solution:
 
     @property
     def energy_residual(self) -> float:
-        """What the energy balance leaves unexplained, as a fraction of the work done; it warns as `energy` does."""
+        """What the energy balance leaves unexplained, as a fraction of the work done; warns as `energy` does."""
         return self.energy.residual
 
     def to_pandas(self, *names: str) -> pd.DataFrame:
@@ -230,40 +231,43 @@ class Solution:
         An `AccuracyWarning` says where output times are too far apart to show how the named quantities, or else the
         states, swing.
         """
-        frame = imported("pandas", "data", "Solution.to_pandas()")
-        columns = {title: column for name in names or self.names for title, column in self._columns(name)}
+        table = to_pandas(self, names or self.names)
         self._warn_of_coarse_samples(names)
-        return frame.DataFrame(columns, index=frame.Index(self.t, name="t"))
-
-    def _columns(self, name: str) -> Iterator[tuple[str, Array]]:
-        """A quantity in columns (k,) with their titles."""
-        values = self[name]
-        if values.ndim == 1:
-            yield name, values
-        else:
-            yield from zip((f"{name} at {place:g} m" for place in self.places[name]), values.T, strict=True)
+        return table
 
     def to_xarray(self, *names: str) -> xarray.Dataset:
         """A data set over time of the named quantities, as `to_pandas` takes them, with units (extra `data`).
 
         One along a shaft has its places in m as second dimension, "line.tau.x". Warns as `to_pandas` does.
         """
-        library = imported("xarray", "data", "Solution.to_xarray()")
-        coords = {"t": ("t", self.t, {"units": "s"})}
-        data = {}
-        for name in names or self.names:
-            values, along = self[name], f"{name}.x"
-            if values.ndim > 1:
-                coords[along] = (along, self.places[name], {"units": "m"})
-            data[name] = (("t", along)[: values.ndim], values, {"units": self.reader.unit(name)})
+        data = to_xarray(self, names or self.names, {"title": self.name, "engine": self.engine, "why": self.why})
         self._warn_of_coarse_samples(names)
-        return library.Dataset(  # type: ignore[no-any-return]
-            data, coords=coords, attrs={"title": self.name, "engine": self.engine, "why": self.why}
-        )
+        return data
 
     def plot(self, *names: str) -> Figure:
         """Curves over time, those of like size and the same unit on one axis, and the phases below (extra `plot`)."""
         return plot_signals(self.reader, names or self.states, self.phases, self.events)
+
+    def animate(
+        self, *names: str, start: float | None = None, end: float | None = None, seconds: float = 8.0
+    ) -> Animation:
+        """The motion as a moving picture: discs turn, shafts are coloured by their torque, curves run below.
+
+        Turning is slowed down and twists are enlarged, by factors that the picture names. Notebooks show it.
+
+        Args:
+            *names: quantities whose curves stand below; by default the first states.
+            start, end: of the span that is shown, s.
+            seconds: how long it is shown.
+
+        Raises:
+            MissingExtraError: matplotlib is not installed.
+            ParameterError: nothing rotates, or the span is not within the motion.
+            SignalError: there is no such quantity.
+        """
+        from shaftwork.animation.animation import animate
+
+        return animate(self.reader, names or self.states[:3], self.phases, span_of(self.reader, start, end), seconds)
 
     def rainflow(self, name: str, *, place: int | None = None, smallest: float = SMALLEST) -> Rainflow:
         """The load cycles of a quantity, such as "shaft.tau", over the run (extra `life`).
@@ -281,6 +285,62 @@ class Solution:
             SignalError: there is no such quantity or place.
         """
         return load_cycles(self.reader, name, place, smallest)
+
+    def spectrum(
+        self,
+        name: str,
+        *,
+        place: int | None = None,
+        start: float | None = None,
+        end: float | None = None,
+        f_max: float | None = None,
+    ) -> Spectrum:
+        """The amplitude spectrum of a quantity, such as "shaft.tau", over the run or a span of it.
+
+        Args:
+            name: of the quantity.
+            place: index in `places` of a quantity that is read along a part; by default the middle one.
+            start: of the span, s.
+            end: of the span, s.
+            f_max: highest frequency, Hz; by default sampling is refined until there is little above it.
+
+        Raises:
+            ParameterError: the span is not within the motion, or there is no such place.
+            SignalError: there is no such quantity.
+        """
+        from shaftwork.spectra.spectrum import spectrum
+
+        return spectrum(self.reader, name, place, start, end, f_max)
+
+    def order_spectra(
+        self,
+        name: str,
+        speed: str,
+        *,
+        place: int | None = None,
+        turns: float = 8.0,
+        order_max: float = 20.0,
+        start: float | None = None,
+        end: float | None = None,
+    ) -> OrderSpectra:
+        """Spectra of a quantity over the order of a shaft, while its speed changes: a waterfall.
+
+        Args:
+            name: of the quantity, such as "shaft.tau".
+            speed: of the shaft, such as "motor.omega", which must turn one way.
+            place: index in `places` of a quantity that is read along a part; by default the middle one.
+            turns: of the shaft in each spectrum; its lines are 1 / turns of an order apart.
+            order_max: highest order.
+            start: of the span, s.
+            end: of the span, s.
+
+        Raises:
+            ParameterError: the shaft does not turn one way, or not often enough; an argument is out of its range.
+            SignalError: there is no such quantity.
+        """
+        from shaftwork.spectra.order_spectra import order_spectra
+
+        return order_spectra(self.reader, name, speed, place, turns, order_max, (start, end))
 
     @overload
     def damage(self, name: str, *, sn: SNLine, smallest: float = SMALLEST) -> Damage: ...
@@ -312,6 +372,11 @@ class Solution:
     def _warn_of_coarse_samples(self, names: Sequence[str]) -> None:
         if "dense" in vars(self):  # one that is stored would have to be made again
             warn_of_coarse_samples(self.reader, self.t, self.x, names)
+
+    def _repr_html_(self) -> str:
+        title, why, *_ = repr(self).splitlines()
+        spans = [(f"{row.start:.6g}", f"{row.end:.6g}", row.name) for row in self.phases]
+        return html_table(title, ("from s", "to s", "phase"), spans, why.strip())
 
     def __repr__(self) -> str:
         span = f"{counted(len(self.t), 'time')} from {self.t[0]:g} to {self.t[-1]:g} s"

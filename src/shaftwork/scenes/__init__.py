@@ -24,6 +24,7 @@ from shaftwork.scenes.long_shafts import (
     shaft_step,
     ship_line,
 )
+from shaftwork.scenes.ship_engine import SHIP_ENGINE, ship_engine
 
 SCENES: dict[str, Scene] = {
     scene.name: scene
@@ -38,6 +39,7 @@ SCENES: dict[str, Scene] = {
         SHAFT_CHAIN,
         SHAFT_STEP,
         SHIP_LINE,
+        SHIP_ENGINE,
     )
 }
 """Every scene by its name, in the order in which they are listed: the simplest crane first."""
@@ -53,6 +55,7 @@ __all__ = [
     "excavator_train",
     "shaft_chain",
     "shaft_step",
+    "ship_engine",
     "ship_line",
     "six_phases",
 ]

@@ -19,8 +19,7 @@ from shaftwork.pipeline.network import Network
 from shaftwork.scenes.catalog import Scene
 
 LENGTH, DIAMETER, DENSITY = 1.0, 0.02, 7900.0  # m, m, kg/m3
-SHEAR_MODULUS = 77.5e9  # Pa: steel
-PRINTED_SHEAR_MODULUS = 7.75e9  # Pa: 7750 MN/m2 as printed, ten times too small for steel
+SHEAR_MODULUS = 77.5e9  # Pa: steel; the source prints 7750 MN/m2, ten times too small
 MOTOR_INERTIA, LOAD_INERTIA = 0.025, 0.11  # kg m2
 RATED_TORQUE = 12.7  # N m: 4 kW at 3000 1/min
 

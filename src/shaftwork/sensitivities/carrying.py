@@ -16,10 +16,10 @@ from shaftwork.sensitivities.differentiation import Differentiated
 from shaftwork.sensitivities.legs import LATE, SAME, Leg
 
 if TYPE_CHECKING:
+    from shaftwork.hybrid.equation_sets import EquationSets
     from shaftwork.hybrid.hybrid_state import Change
     from shaftwork.hybrid.modes.mode_equations import ModeEquations
     from shaftwork.hybrid.modes.mode_machines import ModeNames
-    from shaftwork.hybrid.phases import Phases
 
 
 class _ModeStep(NamedTuple):
@@ -63,15 +63,15 @@ class SensitivityTransfer:
     """Takes states and their derivatives over from one set of equations to another.
 
     Args:
-        phases: the sets of equations.
+        equation_sets: the sets of equations.
         equations: those of a model, ready for sensitivities.
         sizes: (n,) of the states of a model.
     """
 
     def __init__(
-        self, phases: Phases, equations: Callable[[Model], Differentiated], sizes: Callable[[Model], Array]
+        self, equation_sets: EquationSets, equations: Callable[[Model], Differentiated], sizes: Callable[[Model], Array]
     ) -> None:
-        self._phases, self._equations, self._sizes = phases, equations, sizes
+        self._equation_sets, self._equations, self._sizes = equation_sets, equations, sizes
 
     def over(self, before: Leg, after: Leg, ends: Sequence[End], changes: Sequence[Change]) -> tuple[int, Array]:
         """Which of the ends it was, and the total derivatives (n', m) of the new states.
@@ -98,7 +98,7 @@ class SensitivityTransfer:
         nearest = min((away for away, *_ in candidates), default=np.inf)
         if nearest <= LATE:
             return next((k, slopes) for away, k, slopes in candidates if away <= nearest + SAME)
-        names = ", ".join(dict.fromkeys(f"'{change.element.name}'" for change in changes)) or "parts"
+        names = ", ".join(dict.fromkeys(f"'{change.machine.name}'" for change in changes)) or "parts"
         raise SimulationError(
             f"At t = {after.start:.9g} s {names} change together, and how the derivatives pass that is not known here. "
             "Take the difference of two variants, studies.sweep(...)."
@@ -118,23 +118,23 @@ class SensitivityTransfer:
             modes: before.
             last: after.
             changes: in their order.
-            besides: in an impact other elements are already in the modes that follow.
+            besides: in an impact other machines are already in the modes that follow.
         """
         from shaftwork.hybrid.modes.mode_machines import with_modes
 
-        numbers = {id(element): k for k, element in enumerate(self._phases.elements)}
+        numbers = {id(machine): k for k, machine in enumerate(self._equation_sets.machines)}
         steps: list[_ModeStep] = []
         for place, change in enumerate(changes):
-            number = numbers[id(change.element)]
+            number = numbers[id(change.machine)]
             if not change.impact:
                 modes = with_modes(modes, {number: change.after})
                 continue
-            others = {numbers[id(later.element)]: later.after for later in changes[place + 1 :] if not later.impact}
+            others = {numbers[id(later.machine)]: later.after for later in changes[place + 1 :] if not later.impact}
             modes = with_modes(modes, {**(others if besides else {}), number: change.after})
             if not change.rebound:
                 steps.append(_ModeStep(modes))
                 continue
-            leaves = change.element.modes[change.before].leaves
+            leaves = change.machine.modes[change.before].leaves
             share = next(leave.rebound for leave in leaves if leave.rebound is not None and leave.to == change.after)
             parted = with_modes(modes, {number: change.before})
             steps.append(_ModeStep(modes, (number, share), parted))
@@ -147,20 +147,20 @@ class SensitivityTransfer:
         """States (n',) and their total derivatives (n', m) at the end of a path."""
         model, p, (x, _, slopes, shift) = before.model, before.p, end
         for step in steps:
-            assembly, old = self._phases.assembly(step.modes), p
-            p = assembly.vector({}, self._phases.numbers(step.modes))
-            if assembly.model is model and step.rebound is None:
+            equations, old = self._equation_sets.of(step.modes), p
+            p = equations.vector({}, self._equation_sets.numbers(step.modes))
+            if equations.model is model and step.rebound is None:
                 continue
             stored = self._stored(model, t, x, old, slopes, shift)
-            x, slopes = self._taken_over(assembly, t, p, stored, shift)
+            x, slopes = self._taken_over(equations, t, p, stored, shift)
             if step.rebound is not None:
                 stored = self._thrown(
-                    assembly, p, stored, self._stored(assembly.model, t, x, p, slopes, shift), step.rebound
+                    equations, p, stored, self._stored(equations.model, t, x, p, slopes, shift), step.rebound
                 )
-                assembly = self._phases.assembly(step.parted)
-                p = assembly.vector({}, self._phases.numbers(step.parted))
-                x, slopes = self._taken_over(assembly, t, p, stored, shift)
-            model = assembly.model
+                equations = self._equation_sets.of(step.parted)
+                p = equations.vector({}, self._equation_sets.numbers(step.parted))
+                x, slopes = self._taken_over(equations, t, p, stored, shift)
+            model = equations.model
         return x, slopes
 
     def _stored(
@@ -173,25 +173,25 @@ class SensitivityTransfer:
         )
 
     def _taken_over(
-        self, assembly: ModeEquations, t: float, p: Array, stored: _StoredWithDerivatives, shift: Array
+        self, equations: ModeEquations, t: float, p: Array, stored: _StoredWithDerivatives, shift: Array
     ) -> tuple[Array, Array]:
-        takeover = self._equations(assembly.model).takeover
-        x = assembly.stores.states(assembly.bound(p), t, stored.values)
+        takeover = self._equations(equations.model).takeover
+        x = equations.stores.states(equations.bound(p), t, stored.values)
         values = np.array([stored.values[name] for name in takeover.names])
         slopes = np.array([stored.slopes[name] for name in takeover.names]).reshape(len(values), shift.size)
         return x, takeover.taken(t, x, p, values, slopes, shift)
 
     def _thrown(
         self,
-        assembly: ModeEquations,
+        equations: ModeEquations,
         p: Array,
         before: _StoredWithDerivatives,
         joined: _StoredWithDerivatives,
         rebound: tuple[int, Expr],
     ) -> _StoredWithDerivatives:
         """After an impact that throws back: v_joined + e (v_joined - v_before)."""
-        expression = assembly.of_element(*rebound)
-        shown, nowhere = self._equations(assembly.model).shown(expression), np.zeros(len(assembly.model.states))
+        expression = equations.of_machine(*rebound)
+        shown, nowhere = self._equations(equations.model).shown(expression), np.zeros(len(equations.model.states))
         share = float(shown.value(np.zeros(1), nowhere[None, :], p)[0, 0])
         by_parameters = shown.slopes(0.0, nowhere, p)[1]
         change = {name: value - before.values[name] for name, value in joined.values.items()}

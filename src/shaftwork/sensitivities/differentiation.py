@@ -21,6 +21,7 @@ from sympy import Add, Dummy, Expr, Symbol
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.code import vectorised_list
+from shaftwork.codegen.compiled_model import CompiledModel
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.discontinuities import switches, switches_of
 from shaftwork.components.law_slopes import slope
@@ -30,10 +31,9 @@ from shaftwork.formulation.explicit_rows import Rows
 from shaftwork.formulation.form import State, StateForm
 from shaftwork.formulation.gains import Number, exact_of
 from shaftwork.formulation.observables import Observables
-from shaftwork.pipeline.prepared import EngineModel
 
 
-def rows_of(model: EngineModel) -> Rows:
+def rows_of(model: CompiledModel) -> Rows:
     """The symbolic equations of a model.
 
     Raises:

@@ -21,12 +21,12 @@ from shaftwork.results.solution import Solution
 from shaftwork.sensitivities.differentiation import Differentiated
 
 if TYPE_CHECKING:
+    from shaftwork.hybrid.equation_sets import EquationSets
+    from shaftwork.hybrid.hybrid_model import HybridModel
     from shaftwork.hybrid.hybrid_run import HybridRun, Span
     from shaftwork.hybrid.hybrid_state import Change
     from shaftwork.hybrid.modes.mode_equations import ModeEquations
     from shaftwork.hybrid.modes.mode_machines import ModeNames
-    from shaftwork.hybrid.phased_model import PhasedModel
-    from shaftwork.hybrid.phases import Phases
 
 SAME = 1e-9
 """Times are equal where they differ by no more than this part of the run, and rates, derivatives, heights and states by
@@ -54,8 +54,8 @@ class Leg:
         p: their parameters, numbers of modes among them.
         dense: from times (k,) to states (k, n).
         steps: (s,) ends of the steps of the run, from start to end, s.
-        assembly: the same equations with their guards; None where no part changes its mode.
-        modes: of every element.
+        equations: the same equations with their guards; None where no part changes its mode.
+        modes: of every machine.
         turned: what a law has changed its sides by at the start, because of the motion.
     """
 
@@ -67,7 +67,7 @@ class Leg:
     p: Array
     dense: Callable[[Array], Array]
     steps: Array
-    assembly: ModeEquations | None = None
+    equations: ModeEquations | None = None
     modes: ModeNames = ()
     turned: tuple[Expr, ...] = ()
 
@@ -136,14 +136,14 @@ class DifferentiatedMotion:
         legs: its smooth spans.
         changes: of modes, in their order.
         start: what it starts from, in the equations in which nothing is joined; None where no part changes its mode.
-        phases: the sets of equations, likewise.
+        equation_sets: the sets of equations, likewise.
     """
 
     solution: Solution
     legs: tuple[Leg, ...]
     changes: tuple[Change, ...] = ()
     start: Leg | None = None
-    phases: Phases | None = None
+    equation_sets: EquationSets | None = None
 
     @property
     def models(self) -> tuple[Model, ...]:
@@ -159,7 +159,7 @@ def motion_of(model: Model, span: tuple[float, float], initial: Given, rtol: flo
         SimulationError: it could not be found, or a prescribed speed jumps.
     """
     if model.phased:
-        differentiated = _through_phases(cast("PhasedModel", model), span, initial, rtol)
+        differentiated = _through_phases(cast("HybridModel", model), span, initial, rtol)
     else:
         motion = model.simulate(span[1], t_start=span[0], initial=initial, rtol=rtol, t_eval="steps")
         differentiated = DifferentiatedMotion(motion, tuple(_legs_of_model(model, motion)))
@@ -167,35 +167,35 @@ def motion_of(model: Model, span: tuple[float, float], initial: Given, rtol: flo
     return differentiated
 
 
-def _through_phases(model: PhasedModel, span: tuple[float, float], initial: Given, rtol: float) -> DifferentiatedMotion:
+def _through_phases(model: HybridModel, span: tuple[float, float], initial: Given, rtol: float) -> DifferentiatedMotion:
     """The motion of a network whose parts change their mode."""
     from shaftwork.hybrid.hybrid_run import HybridRun
     from shaftwork.hybrid.hybrid_solution import solution
 
     run = HybridRun(
-        model.phases, {}, Demand(span, rtol, None, None, "auto", Problem.max_steps, None), by_combination=True
+        model.equation_sets, {}, Demand(span, rtol, None, None, "auto", Problem.max_steps, None), by_combination=True
     )
     run.march(initial)
     legs, changes = tuple(_legs_of_run(run)), tuple(run.changes)
-    return DifferentiatedMotion(solution(run, model.name), legs, changes, _start(run, initial), model.phases)
+    return DifferentiatedMotion(solution(run, model.name), legs, changes, _start(run, initial), model.equation_sets)
 
 
 def _start(run: HybridRun, initial: Given) -> Leg:
-    phases, span = run.phases, run.demand.span
-    assembly, p = phases.first_equations({})
-    x, _ = assembly.model.start(assembly.prepared(p), initial, span)
-    after = run.timeline(assembly, p).sides(span[0])[1]
+    equation_sets, span = run.equation_sets, run.demand.span
+    equations, p = equation_sets.first_equations({})
+    x, _ = equations.model.start(equations.prepared(p), initial, span)
+    after = run.timeline(equations, p).sides(span[0])[1]
     return Leg(
         start=span[0],
         end=span[0],
         low=after,
         high=after,
-        model=assembly.model,
+        model=equations.model,
         p=p,
         dense=lambda times: np.tile(x, (len(times), 1)),
         steps=np.array([span[0]]),
-        assembly=assembly,
-        modes=phases.first,
+        equations=equations,
+        modes=equation_sets.first,
     )
 
 
@@ -221,10 +221,10 @@ def _legs_of_run(run: HybridRun) -> Iterator[Leg]:
         starts = [phase.start for phase in span.phases]
         for phase, (start, stop) in zip(span.phases, pairwise([*starts, end]), strict=True):
             if stop > start:
-                assembly, p = phase.regime.assembly, phase.regime.p
-                instants = run.timeline(assembly, p)
-                leg = _leg(assembly.model, p, _states(span), span.trajectory.steps, (start, stop), instants)
-                yield replace(leg, assembly=assembly, modes=phase.regime.modes)
+                equations, p = phase.regime.equations, phase.regime.p
+                instants = run.timeline(equations, p)
+                leg = _leg(equations.model, p, _states(span), span.trajectory.steps, (start, stop), instants)
+                yield replace(leg, equations=equations, modes=phase.regime.modes)
 
 
 def _states(span: Span) -> Callable[[Array], Array]:

@@ -34,11 +34,6 @@ if TYPE_CHECKING:
 
 STAGES = 6
 """Of a step: order 12, and no stage on its ends, where laws jump."""
-CLOSER = 64
-"""Two halves are closer to the solution than their difference from the whole by more than this."""
-MOST_STEPS = 1_000_000
-EVERY = 8
-"""So many steps of the run are one at first: implicit, it need not follow what has died away."""
 
 Coefficients = Callable[[Array], tuple[Array, Array]]
 """From times (k,) to A (k, N, n) and B (k, N, m) of Y' = A Y[:n] + B; rows behind the first n are mere integrals."""
@@ -47,15 +42,6 @@ _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(STAGES)
 NODES = (_POINTS + 1) / 2
 # integrals from the start of a step to each node and to its end, from values at the nodes
 _TO_NODES, _TO_END = to_integrals(_POINTS) / 2, _WEIGHTS / 2
-ROUNDING = 1e-3
-"""What a change of a parameter by all of itself does to a state is rounding below this part of the state's size."""
-DOUBTFUL = 1e-6
-"""Relative error of derivatives from which on there is a warning."""
-APART = 1e-3
-"""Two changes depend on parameters apart where the derivatives of their times differ by more than this part of them, or
-of the run for all of a parameter."""
-BESIDE = 1e-3
-"""A quantity is looked at so far beside its extreme, in steps of the run, to see where it turns."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +83,8 @@ def variation(
     Raises:
         SimulationError: it takes too many steps, or there is no value.
     """
-    ends = np.append(ends[:-1:EVERY], ends[-1])
+    # Eight steps of the run are one at first: an implicit method need not follow what has died away.
+    ends = np.append(ends[:-1:8], ends[-1])
     begins, lengths = ends[:-1], np.diff(ends)
     steps = _Steps(begins, lengths, _maps(coefficients, begins, lengths), np.zeros(len(lengths), dtype=bool))
     while True:
@@ -106,11 +93,12 @@ def variation(
         errors = np.abs(_stepped(steps.maps[~steps.right], values[whole]) - values[whole + 2])
         largest = np.maximum.accumulate((np.abs(values) / sizes[:, None]).max(axis=1, initial=0.0), axis=0)
         scale = sizes[:, None] * np.maximum(largest, least)[:, None]
-        accurate = (errors <= CLOSER * rtol * scale[whole + 2]).all(axis=(1, 2))
+        # Two halves are more than 64 times as close to the solution as to the whole.
+        accurate = (errors <= 64 * rtol * scale[whole + 2]).all(axis=(1, 2))
         parts.right[whole] = parts.right[whole + 1] = accurate
         if parts.right.all():
             return Variation(coefficients, np.append(parts.begins, ends[-1]), values)
-        if len(parts.begins) > MOST_STEPS or not np.isfinite(values).all():
+        if len(parts.begins) > 1_000_000 or not np.isfinite(values).all():
             worst = int(np.argmin(parts.right))
             raise SimulationError(f"The sensitivities could not be integrated beyond t = {parts.begins[worst]:.9g} s.")
         steps = parts
@@ -247,7 +235,8 @@ class MotionSlopes:
 
     def _integrate(self) -> None:
         motion, count = self._motion, len(self._symbols)
-        carrying = None if motion.phases is None else SensitivityTransfer(motion.phases, self.equations, self.sizes)
+        sets = motion.equation_sets
+        carrying = None if sets is None else SensitivityTransfer(sets, self.equations, self.sizes)
         length, fixed = self.legs[-1].end - self.legs[0].start, np.zeros(count)
         jumps = JumpConditions(self.equations, carrying, self.sizes, self._swiftest.__getitem__, length)
         slopes = np.zeros((self._swiftest[self.legs[0].model].size, count))
@@ -278,7 +267,9 @@ class MotionSlopes:
             return
         if first.shift is not None and second.shift is not None:
             apart, largest = np.abs(first.shift - second.shift), np.maximum(np.abs(first.shift), np.abs(second.shift))
-            if (apart <= APART * (largest + length * self._inverse)).all():
+            # Both depend on parameters alike where the derivatives of their times differ by less than a thousandth of
+            # them, or of the run for all of a parameter.
+            if (apart <= 1e-3 * (largest + length * self._inverse)).all():
                 return  # the second follows from the first
         raise by_chance(leg, "several changes")
 
@@ -286,7 +277,8 @@ class MotionSlopes:
         """The derivatives along a leg, from those at its start."""
         integrals = self._swiftest[leg.model][len(leg.model.states) :] * length
         sizes = np.concatenate([self.sizes(leg.model), np.where(integrals > 0, integrals, 1.0)])
-        return variation(self._coefficients(leg), leg.steps, slopes, sizes, ROUNDING * self._inverse, self._rtol)
+        # Below a thousandth of a state's size, what a parameter does by all of itself is rounding.
+        return variation(self._coefficients(leg), leg.steps, slopes, sizes, 1e-3 * self._inverse, self._rtol)
 
     @property
     def _inverse(self) -> Array:
@@ -351,7 +343,8 @@ class MotionSlopes:
         """
         leg = self.legs[int(self._leg_at(np.array([t]))[0])]
         k = int(np.clip(np.searchsorted(leg.steps, t), 1, len(leg.steps) - 1))
-        aside = BESIDE * (leg.steps[k] - leg.steps[k - 1])
+        # A thousandth of a step beside its extreme the quantity shows where it turns.
+        aside = 1e-3 * (leg.steps[k] - leg.steps[k - 1])
         low, high = max(t - aside, leg.low), min(t + aside, leg.high)
         if self._rate(quantity, leg, low) * self._rate(quantity, leg, high) < 0:
             return zero(lambda time: np.array([self._rate(quantity, leg, time[0])]), low, high, xtol=aside * EXACT)
@@ -373,7 +366,7 @@ class MotionSlopes:
 
 
 def _warn(doubt: float, t: float) -> None:
-    if doubt > DOUBTFUL:
+    if doubt > 1e-6:
         warn(
             f"Sensitivities are right to some {doubt:.0e} only: at t = {t:.9g} s something changes that is hardly "
             "moving any more. Of rigid contacts a larger omega_rest helps.",

@@ -223,7 +223,7 @@ class JumpConditions:
         if changes and not (caused or instant):
             raise SimulationError(
                 f"At t = {new.leg.start:.9g} s it cannot be told what has changed the mode of "
-                f"'{changes[0].element.name}', and so not how the time of it depends on the parameters. {ADVICE}"
+                f"'{changes[0].machine.name}', and so not how the time of it depends on the parameters. {ADVICE}"
             )
         yield from caused
 
@@ -231,14 +231,14 @@ class JumpConditions:
         """Guards of what changes that are about to be met, and how soon in s."""
         leg = old.leg
         first: dict[int, Change] = {}
-        if leg.assembly is None:
+        if leg.equations is None:
             return
         for change in changes:
-            first.setdefault(id(change.element), change)
-        for watched in leg.assembly.watched(leg.modes):
-            ended = first.get(id(leg.assembly.elements[watched.element]))
+            first.setdefault(id(change.machine), change)
+        for watched in leg.equations.watched(leg.modes):
+            ended = first.get(id(leg.equations.machines[watched.machine]))
             if ended is not None:
-                guard = leg.assembly.guards_shown[watched.guard]
+                guard = leg.equations.guards_shown[watched.guard]
                 value, rate = self._course(old, guard)
                 if watched.side * rate > 0:
                     back = 0.0 if watched.leave.rebound is None else max(value / rate, 0.0)
@@ -299,8 +299,8 @@ class JumpConditions:
         laws = [cause.argument for cause in causes if cause.change is None]
         for change in (cause.change for cause in causes if cause.change is not None):
             names = tuple(leg.model.parameters)
-            if change.element.number in names:
-                p[names.index(change.element.number)] = change.element.modes[change.after].value
+            if change.machine.number in names:
+                p[names.index(change.machine.number)] = change.machine.modes[change.after].value
         return self._equations(leg.model).rates_past(laws, new.t, old.t, old.x, p)
 
 
@@ -315,8 +315,8 @@ def by_chance(leg: Leg, what: str) -> SimulationError:
 def _worded(cause: _Cause) -> str:
     if cause.change is None:
         return f"the switch of a law by {cause.argument}"
-    element, before, after = cause.change.element, cause.change.before, cause.change.after
-    return f"the change of '{element.name}' from {element.modes[before].words} to {element.modes[after].words}"
+    machine, before, after = cause.change.machine, cause.change.before, cause.change.after
+    return f"the change of '{machine.name}' from {machine.modes[before].words} to {machine.modes[after].words}"
 
 
 def _touched(leg: Leg, what: str) -> SimulationError:

@@ -12,6 +12,7 @@ from scipy.linalg import eig, matrix_balance
 from sympy import Symbol
 
 from shaftwork.codegen.array_form.elements import Array
+from shaftwork.codegen.compiled_model import CompiledModel
 from shaftwork.components.law_slopes import slope
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.noise import HeldNoise, SmoothNoise
@@ -20,7 +21,6 @@ from shaftwork.pipeline.arguments import Given, Point, Time, by_name, relative_t
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import refuse_motion
 from shaftwork.pipeline.network import Network, network_of
-from shaftwork.pipeline.prepared import EngineModel
 from shaftwork.results.course import SMALLEST, turning_points
 from shaftwork.results.measures import EXTREMES, KINDS, POWERS, Measure
 from shaftwork.results.observer import Complex
@@ -31,14 +31,8 @@ from shaftwork.sensitivities.motion_slopes import MotionSlopes
 from shaftwork.sensitivities.sensitivity_tables import FrequencySensitivities, MotionSensitivities
 
 if TYPE_CHECKING:
-    from shaftwork.hybrid.phased_model import PhasedModel
+    from shaftwork.hybrid.hybrid_model import HybridModel
 
-ROUNDINGS = 16
-"""Roundings that the rate of a mode may have taken, each as large as its condition makes it."""
-TIGHTER, TIGHTEST = 1e-2, 1e-13
-"""Of the tolerance of derivatives is that of the motion, and no engine takes a smaller one."""
-ALIKE = 1e-7
-"""They change alike where their percents for a percent of a parameter differ by no more than this."""
 NO_DERIVATIVE = {
     "decisive": "decides which equations hold, so nothing is smooth in it. Give it a value that is not exactly zero, "
     "and ratios that are not alike.",
@@ -47,8 +41,6 @@ NO_DERIVATIVE = {
     "edge": "moves a switch that is exactly at the start or at the end of the motion, where it comes in or goes out. "
     "Take another t_end, or leave it out.",
 }
-SHIFT = 1e-3
-"""By this part a parameter is made smaller."""
 
 
 def frequency_sensitivities(
@@ -101,7 +93,8 @@ def _roundings(matrix: Array, left: Complex, right: Complex) -> Array:
     balanced, (scale, _) = matrix_balance(matrix, permute=False, separate=True)
     sizes = norm(left * scale[:, None], axis=0) * norm(right / scale[:, None], axis=0)
     condition = sizes / np.abs((left.conj() * right).sum(axis=0))
-    return np.asarray(ROUNDINGS * np.finfo(float).eps * norm(balanced) * condition)
+    # A rate may have taken 16 roundings, each as large as its condition makes it.
+    return np.asarray(16 * np.finfo(float).eps * norm(balanced) * condition)
 
 
 def _refuse_equal(rates: Complex, chosen: NDArray[np.intp], roundings: Array) -> None:
@@ -160,7 +153,8 @@ def motion_sensitivities(
     rows_of(model)
     smooth_parameters(model, names, (model,), span)  # what is wrong with them is said before the motion is made
     integrands = dict.fromkeys(item for measure in read.values() if (item := integrand(measure)) is not None)
-    motion = motion_of(model, span, initial, max(TIGHTER * tolerance, TIGHTEST))
+    # The motion is a hundred times as close as its derivatives; no engine takes a tolerance below 1e-13.
+    motion = motion_of(model, span, initial, max(1e-2 * tolerance, 1e-13))
     names = smooth_parameters(model, names, motion.models, span)
     names = without_start(model, names, initial, span, are_asked=parameters is not None)
     nominal = {name: model.parameters[name] for name in names}
@@ -240,7 +234,8 @@ def _extreme(measure: Measure, slopes: MotionSlopes) -> tuple[float, Array]:
     signs = np.sign(turns.values) if measure.kind == "peak" else np.ones(len(turns.values))
     times = [slopes.turning(measure.quantity, float(turns.t[k])) for k in highest]
     derivatives = np.array([signs[k] * slopes.slopes(measure.quantity, t) for k, t in zip(highest, times, strict=True)])
-    if (np.ptp(derivatives, axis=0) * np.abs(slopes.parameters) > ALIKE * np.abs(turns.values).max()).any():
+    # Both change alike where their percents for a percent of a parameter differ by no more.
+    if (np.ptp(derivatives, axis=0) * np.abs(slopes.parameters) > 1e-7 * np.abs(turns.values).max()).any():
         words = " and ".join(f"{time:.9g}" for time in times[:2])
         raise SimulationError(
             f"'{measure}' is reached at t = {words} s alike, and which of them is higher depends on the parameters: "
@@ -251,7 +246,7 @@ def _extreme(measure: Measure, slopes: MotionSlopes) -> tuple[float, Array]:
 
 
 def smooth_parameters(
-    model: Model, names: Sequence[str] | None, used: Sequence[EngineModel], span: tuple[float, float] | None = None
+    model: Model, names: Sequence[str] | None, used: Sequence[CompiledModel], span: tuple[float, float] | None = None
 ) -> tuple[str, ...]:
     """The parameters by which to differentiate.
 
@@ -286,7 +281,7 @@ def smooth_parameters(
     return tuple(names)
 
 
-def _seeds(model: EngineModel) -> Iterator[str]:
+def _seeds(model: CompiledModel) -> Iterator[str]:
     graph = model.form.graph
     for branch in graph.branches:
         law = graph.in_network_symbols(branch.template.law, branch)
@@ -294,7 +289,7 @@ def _seeds(model: EngineModel) -> Iterator[str]:
             yield from (symbol.name for symbol in noise.args[1].free_symbols)
 
 
-def _at_edges(model: EngineModel, span: tuple[float, float]) -> Iterator[str]:
+def _at_edges(model: CompiledModel, span: tuple[float, float]) -> Iterator[str]:
     """Parameters that move a switch of a law of time, or of a mode, which is at the start or at the end of a motion."""
     switching, p = model.switching, model.defaults
     instants = switching.timeline(p, *span)
@@ -339,8 +334,9 @@ def _moved(model: Model, names: Sequence[str], initial: Given, span: tuple[float
     """The states that start elsewhere where some parameters are others."""
     values = {name: model.parameters[name] for name in names}
     states, start = _start(model, {}, initial, span)
-    other = _start(model, {name: value * (1 - SHIFT) for name, value in values.items()}, initial, span)[1]
-    far = np.abs(other - start) > SAME * SHIFT * np.abs(start).max(initial=0.0)
+    shift = 1e-3  # by which part each parameter is made smaller
+    other = _start(model, {name: value * (1 - shift) for name, value in values.items()}, initial, span)[1]
+    far = np.abs(other - start) > SAME * shift * np.abs(start).max(initial=0.0)
     return tuple(name for name, moves in zip(states, far.tolist(), strict=True) if moves)
 
 
@@ -350,5 +346,5 @@ def _start(
     """The states by name, and where they start, in the equations in which nothing is joined."""
     if not model.phased:
         return tuple(model.states), model.start(model.prepare(model.vector(values)), initial, span)[0]
-    assembly, p = cast("PhasedModel", model).phases.first_equations(values)
-    return tuple(assembly.model.states), assembly.model.start(assembly.prepared(p), initial, span)[0]
+    first, p = cast("HybridModel", model).equation_sets.first_equations(values)
+    return tuple(first.model.states), first.model.start(first.prepared(p), initial, span)[0]

@@ -19,8 +19,6 @@ from shaftwork.sizing.motor_shaft import SMALLEST
 
 OWN = Path(__file__).with_name("motors.csv")
 TYPICAL = "chosen: typical of a motor of this frame size and power; frame sizes by power after EN 50347"
-CONSISTENT = 0.05
-"""Rated power and torque times speed may differ by this fraction: catalogues round."""
 SHOWN = 8
 """Mistakes of a file, and motors of a choice, that are named at once."""
 
@@ -69,7 +67,7 @@ class CatalogueMotor:
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, in_si(name, getattr(self, name), unit, **bounds))
         product = self.tau_n * self.n_n / RPM
-        if abs(product - self.power) > CONSISTENT * self.power:
+        if abs(product - self.power) > 0.05 * self.power:  # catalogues round
             raise ParameterError(
                 f"power = {self.power:g} W, but tau_n = {self.tau_n:g} N m at n_n = {self.n_n:g} 1/min makes "
                 f"{product:.4g} W. Give power in W, torques in N m, speeds in 1/min."

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 TYPES = ("S1", "S3")
-LONG_CYCLE = 600.0
-"""Duration of a duty cycle in s that IEC 60034-1, 4.2.3, takes where none is agreed on."""
 
 
 @dataclass(frozen=True)
@@ -256,7 +254,8 @@ class Duty:
         if self.cooling < 1:
             full = f"full from {self.n_cooling:.6g} 1/min on" if self.n_cooling else "where it is all the time"
             notes.append(f"cooling {self.cooling:g} at standstill, {full}")
-        if self.duration > LONG_CYCLE:
+        # IEC 60034-1, 4.2.3, takes 600 s where no duration is agreed on
+        if self.duration > 600.0:
             notes.append("the cycle is longer than 10 min; the motor may come to its limits before an average tells")
         return tuple(notes)
 

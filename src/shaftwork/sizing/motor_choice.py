@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 OVERLOAD = 1.3
 """Pull-out torque over the largest torque that is asked for: chosen, what drive practice leaves for voltage drops and
 the tolerance of 10 % that IEC 60034-1 gives the pull-out torque."""
-BRIEF = 1e-5
-"""Panels of less than this part of a motion close in a jump; slopes in them are those of rounding."""
 UNCHECKED = (
     "heat beyond equal copper losses: iron and friction, ambient temperature, altitude, harmonics of the inverter",
     "the inverter's own current and voltage limits",
@@ -240,7 +238,8 @@ def _demand(duty: Duty, rated: Array) -> _Demand:
     panels = duty.panels.split(beyond)
     shape = panels.times.shape
     tau, omega = (values.reshape(shape) for values in shaft.read(panels.times.ravel()))
-    lasting = panels.length > BRIEF * panels.length.sum()
+    # Shorter panels close in a jump: slopes in them are those of rounding.
+    lasting = panels.length > 1e-5 * panels.length.sum()
     on = np.abs(tau) > REST * duty.tau_peak  # what is switched off accelerates nothing
     return _Demand(duty, panels, tau, np.where(on, panels.slopes(omega), 0.0), np.abs(omega) * RPM, lasting)
 

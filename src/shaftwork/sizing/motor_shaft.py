@@ -17,6 +17,7 @@ from shaftwork.components.sources import SpeedSource
 from shaftwork.core.errors import ParameterError, SignalError
 from shaftwork.core.parameters import in_si
 from shaftwork.network.netlist import at_nodes, listed
+from shaftwork.numerics.tolerances import EPS
 from shaftwork.results.course import LobattoPanels, turning_points
 from shaftwork.results.observer import Array, Read, blocks
 from shaftwork.results.solution import Solution
@@ -27,7 +28,6 @@ is above a limit by it is not above it."""
 REST = 1e-12
 """A speed that stays within this part of the highest one may be standstill, such a torque none: see `is_nothing`. Times
 that differ by this part of a motion are one."""
-EPS = float(np.finfo(float).eps)
 CONSTANT, FLAT = 4 * EPS, 45 * EPS
 """What changes by no more than this part of itself is constant; a step in which the speed changes by no more than this
 part of the highest one is part of a plateau."""

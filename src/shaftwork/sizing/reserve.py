@@ -32,8 +32,6 @@ Limit = float | Table | Callable[[Array], Array] | None
 """Largest torque in size, N m, over the motor's speed without sign in 1/min; None for the motor's own."""
 Curve = Callable[[Array, Array], Array]
 """A torque in N m at times (k,) in s and speeds (k,): of a motor in rad/s, largest ones without sign in 1/min."""
-INSTANTS = 257
-"""At which the pull-out torque of a motor is looked for that changes with time; between them it is a straight line."""
 NO_LIMIT = 1 / SMALLEST
 """Torque over its limit where there is none left of it."""
 SPEEDS, BEYOND = 129, 1.5
@@ -135,8 +133,9 @@ def _own(shaft: MotorShaft) -> Curve:
             "motor's speed in 1/min: a number, Table([0, 1500, 3000], [20, 20, 10]), or the limit of a motor of a "
             "catalogue."
         )
-    instants = np.linspace(shaft.steps[0], shaft.steps[-1], INSTANTS)
-    ends = shaft.steps if len(shaft.steps) <= INSTANTS else shaft.steps[:0]
+    count = 257  # between them a pull-out torque that changes with time is a straight line
+    instants = np.linspace(shaft.steps[0], shaft.steps[-1], count)
+    ends = shaft.steps if len(shaft.steps) <= count else shaft.steps[:0]
     times = np.unique(np.concatenate([instants, ends, np.nextafter(ends[1:], -np.inf)]))
     most = _pull_out(curve, times, _fastest(shaft.part, shaft.omega_top))
     return lambda t, _: np.interp(t, times, most)

@@ -267,8 +267,6 @@ COLOURS = {
     "unknown": "#b59ad6",
     "wrong": "#d62728",
 }
-COLUMN, LETTER = 0.24, 0.075
-"""Least width of a column, and width of a letter above the columns, in inches."""
 SIZE = re.compile(r"\b(?:m|n|places)=\d+(?:, )?")
 
 
@@ -283,7 +281,8 @@ def _figure(study: Stability) -> Figure:
     numbers = np.zeros((len(cases), len(kinds) * len(engines)))
     names = list(COLOURS)
     longest = max(len(line) for kind in kinds for line in kind.splitlines())
-    width = max(COLUMN * len(engines), LETTER * (longest + 2)) * len(kinds)
+    # inches: the least width of a column, and that of a letter above the columns
+    width = max(0.24 * len(engines), 0.075 * (longest + 2)) * len(kinds)
     figure = new_figure("Stability.plot()", max(2.5 + width, 8.0), 2.4 + 0.22 * len(cases))
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch

@@ -45,9 +45,9 @@ NONLINEAR, LOOSER = (8, 12, 16, 24, 32), 1e-8
 one, and of a shaft that is damped the high ones do not matter."""
 ALIKE = 10 * LOOSER
 """So much of the largest torque two models may differ that stand for the truth of a nonlinear network."""
+
 MODES = 3
 """Elastic natural frequencies that are compared. The truth names one more, to tell those beyond from them."""
-
 MOST_PREDICTED = 200
 """Up to so many elements the motion of a model is computed by its own definition."""
 

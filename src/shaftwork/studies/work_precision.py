@@ -35,14 +35,8 @@ from shaftwork.studies.truth import (
 )
 from shaftwork.studies.work_precision_result import RTOL, Trial, WorkPrecision
 
-POINTS, CALLS = 401, 5
-"""Output times, and warm calls of which the median counts."""
 LONGEST = 5.0
 """A run is given up after so long, s of CPU. Of a kind that took half of it, larger models are left out."""
-FINER_COSTS = 10.0
-"""Times as long as a coarse model the finest ones of a nonlinear network take, about."""
-BUDGET = 45.0
-"""CPU time in s for all trials, from when the truth is known."""
 LOWEST = 4 * (MODES + 2)
 """Modes of a model that are computed, those of smallest rate: twice as many pairs as there are exact ones up to the
 second beyond those that are judged, since a model may have spurious ones between them."""
@@ -56,8 +50,8 @@ def work_precision(
     models: Sequence[ShaftModel | str] = LADDER,
     engines: Iterable[str] = ("auto",),
     rtols: Iterable[float] = (RTOL,),
-    points: int = POINTS,
-    budget: float = BUDGET,
+    points: int = 401,
+    budget: float = 45.0,
     report: Callable[[Trial], None] | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> WorkPrecision:
@@ -125,7 +119,8 @@ def affordable_end(net: Network, shaft: str, t_end: float) -> float:
     try:
         model.simulate(t_end, progress=watch)
     except SimulationError:
-        return float(f"{reached / FINER_COSTS:.1g}") or t_end
+        # the finest models of a nonlinear network take about ten times as long as a coarse one
+        return float(f"{reached / 10.0:.1g}") or t_end
     return t_end
 
 
@@ -190,7 +185,7 @@ def _trial(motion: _Motion, model: ShaftModel, plan: Trial) -> Trial:
             _bearable(compiled, shaft, plan, motion.t_end)
         solution, first = _timed(compiled, shaft, plan, motion.t_end, motion.t)
         times = [first] if built + first > LONGEST / 2 else []
-        while not times or (len(times) < CALLS and sum(times) < 1.0):
+        while not times or (len(times) < 5 and sum(times) < 1.0):  # their median counts
             times.append(_timed(compiled, shaft, plan, motion.t_end, motion.t)[1])
     except ShaftworkError as error:
         return dataclasses.replace(plan, setup=time.thread_time() - began, why=in_one_line(error))

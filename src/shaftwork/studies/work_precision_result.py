@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 RTOL = 1e-8
 """Relative tolerance of the runs where none is given."""
-TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6)
-"""Errors for which the cheapest model is named."""
 MARKERS = "osD^vP*X<>"
 """One for each kind of model, the same in every study; the colours go with them."""
 FLOOR = 1e-12
@@ -125,7 +123,7 @@ class WorkPrecision:
         """For each of some tolerances the cheapest model, a line each."""
         lines = []
         tried = "none of these" if all(trial.errors for trial in self.trials) else "none of those that were tried"
-        for tolerance in TOLERANCES:
+        for tolerance in (1e-1, 1e-2, 1e-3, 1e-4, 1e-6):
             best = self.cheapest(tolerance)
             what = tried if best is None else f"{best.model} on {best.engine}, {milliseconds(best.cpu)} ms"
             lines.append(f"end torques to {tolerance:g}: {what}")

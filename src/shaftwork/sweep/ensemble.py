@@ -31,10 +31,6 @@ from shaftwork.sweep.ensemble_equations import (
 )
 from shaftwork.sweep.lane_steps import NEAR, Index, LaneRun, Mask, Room, Steps, first_rises, largest
 
-LONGEST = 1 / 50
-"""Of the whole motion: a step."""
-MOST_ROUNDS = 200
-"""Stretches of a motion, each up to a change of mode."""
 FADING = "A law fades to a constant, as exp and tanh do, and a long step might pass over where it changes."
 
 
@@ -184,7 +180,7 @@ class _VariantCourse:
         """Through all of it."""
         waiting = self._begin()
         with np.errstate(all="ignore"):  # a lane that runs away is left to `simulate`
-            for _ in range(MOST_ROUNDS):
+            for _ in range(200):  # stretches up to a change of mode
                 if not waiting:
                     break
                 waiting = [following for group in joined(waiting) for following in self._stretch(group)]
@@ -223,7 +219,7 @@ class _VariantCourse:
         """Lanes up to their guards or the end of the motion."""
         span, code, size = self.ensemble.span, equations.code, len(group.x)
         rates = code.motion(group.t, group.x, p)[0]
-        limits = span[1], LONGEST * (span[1] - span[0])
+        limits = span[1], (span[1] - span[0]) / 50  # the longest step
         run = LaneRun(
             code.step, self.ensemble.room, group.x, rates, group.t, p, equations.sizes, limits, self.ensemble.rtol
         )

@@ -37,8 +37,6 @@ FREE_TIME = heyoka.expression("time")
 """By its own time heyoka does not differentiate."""
 
 
-SAFETY, LEAST_FACTOR, MOST_FACTOR = 0.85, 0.2, 5.0
-"""Of the next step by the error of this one."""
 OF_A_QUANTITY, CANCELLED = 10.0, 1e-4
 """What is measured may be wrong by so many times as much as a state, and by the error of so small a part of what it is
 the difference of: of a stiff damper's torque more would be lost in rounding."""
@@ -267,8 +265,8 @@ class LaneStep:
         new = [_moved(x, size, DOP853.B, slopes) for x, slopes in zip(old, stages, strict=False)]
         begun = [(x, *of) for x, of in zip(integrals, self._integrals, strict=True)]
         error = _step_error(_LaneStart(program, time, size, sizes), begun, blind, stages) / tolerance
-        factor = SAFETY / heyoka.sqrt(heyoka.sqrt(heyoka.sqrt(error + TINY)))  # the error is of order 8
-        factor = _higher(_lower(factor, heyoka.expression(MOST_FACTOR)), heyoka.expression(LEAST_FACTOR))
+        factor = 0.85 / heyoka.sqrt(heyoka.sqrt(heyoka.sqrt(error + TINY)))  # the error is of order 8
+        factor = _higher(_lower(factor, heyoka.expression(5.0)), heyoka.expression(0.2))  # no wilder from step to step
         good = heyoka.lte(error, 1.0)
         arrived = heyoka.select(heyoka.lt(wanted, left), time + size, end)
         after = [heyoka.select(good, moved, x) for x, moved in zip([*old, time], [*new, arrived], strict=True)]

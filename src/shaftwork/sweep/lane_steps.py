@@ -21,38 +21,20 @@ from shaftwork.codegen.array_form.elements import Array
 from shaftwork.numerics.hermite import BEYOND, apart, inner, quintic
 from shaftwork.numerics.zeros import Chosen, zeros
 
-LOOK = 8
-"""After so many steps it is looked whether all lanes have come to the end."""
 OF_A_STEP, LOOSEST_TOLERANCE, TIGHTEST_TOLERANCE = 0.1, 1e-7, 1e-13
 """The tolerance of a step as a part of that of the motion, and its bounds."""
-MOST_AT_ONCE, ROWS_AT_ONCE = 32, 512
-"""Steps of every lane before it is looked at what they have met, and rows of these steps: more leave the cache."""
-MOST_STEPS, LOOKS = 100_000, 4
-"""Of a lane, between two changes of mode; after so many looks it is foreseen how many there will be. A lane that needs
-more is stiff, or swings so often that it is better off alone."""
-FIRST_CHANGE = 0.01
-"""The first step may change a state by so much of its size."""
 WITHOUT_LIMIT = 1e300
 STILL = 8 * float(np.finfo(float).eps)
 """A step that is shorter than this part of the time leads nowhere."""
-WIDTH = 8
-"""Lanes are a multiple of this many: a compiled function takes so many at once, and rounds what is left differently."""
 
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 NEARLY = 0.1
 """Of the range: so near to the top a peak and a dip between the same two samples are looked for."""
-PLACES, NEWTON = 7, 5
-"""Places at which a polynomial is looked at, and steps to a peak between two of them."""
-INSIDE = 1e-4
-"""Of an interval: the motion is followed to so far from its ends."""
 NEAR = 1e-9
 """Of the range: a peak is known where Newton's step rises by less, or a polynomial misses it by less; one that is so
 near zero need not be found. Of the time: between samples that are closer the larger one is the peak. What is stored has
 gone over unchanged where it differs by less than this part of the largest of its kind, and of 1."""
-CLOSE = 0.01
-"""Of an interval: a polynomial is trusted so far from where it has been put right."""
-MOST_ROUNDS, MOST_ITERATIONS = 20, 100
 ROUNDING, ROUNDINGS = 2 * float(np.finfo(float).eps), 16
 """A time is known to rounding, and to so many roundings of the step."""
 There = Callable[[Index, Index, Array], Array]
@@ -154,7 +136,8 @@ class LaneRun:
     ) -> None:
         self._step, self._room, self._end = step, room, limits[0]
         with np.errstate(divide="ignore"):
-            first = FIRST_CHANGE * ((sizes[:, None] + np.abs(x)) / np.abs(rates)).min(axis=0)
+            # The first step changes no state by more than a hundredth of its size.
+            first = 0.01 * ((sizes[:, None] + np.abs(x)) / np.abs(rates)).min(axis=0)
         columns, taken = np.zeros((step.height, t.size)), step.taken(p, sizes)
         columns[: len(x)], columns[step.rows - 2], columns[step.rows - 1] = x, t, np.minimum(first, limits[1])
         step.limit(taken, min(max(OF_A_STEP * rtol, TIGHTEST_TOLERANCE), LOOSEST_TOLERANCE), *limits)
@@ -177,21 +160,24 @@ class LaneRun:
         The steps are gone with the next ones.
         """
         step, count = self._step, self.lanes.size
-        most = min(max(ROWS_AT_ONCE // step.height, LOOK), MOST_AT_ONCE)
+        look = 8  # steps after which it is looked whether all lanes have come to the end
+        most = min(max(512 // step.height, look), 32)  # more rows than 512 leave the cache
         columns = self._room(most + 1, *self._columns.shape)
         columns[0] = self._columns
         step.forget(columns[0])
         for k in range(most):
             step(columns[k], self._taken, columns[k + 1])
-            if k % LOOK == LOOK - 1 and (columns[k, step.rows - 2] >= self._end).all():
+            if k % look == look - 1 and (columns[k, step.rows - 2] >= self._end).all():
                 columns = columns[: k + 2]
                 break
         self._count += len(columns) - 1
         steps = Steps(step, self._taken[:, :count], columns[:, :, :count])
         t, size = steps.last[-2:]
         good = np.isfinite(steps.last).all(axis=0) & ((t >= self._end) | (size > STILL * np.abs(t)))
-        if self._count > LOOKS * most:
-            good &= self._count * (t - steps.t[0]) + (self._end - t) * len(steps.t) < MOST_STEPS * (t - steps.t[0])
+        # After four looks it is foreseen how many steps a lane will take up to the next change of mode: one of more
+        # than 100 000 is stiff, or swings so often that it is better off alone.
+        if self._count > 4 * most:
+            good &= self._count * (t - steps.t[0]) + (self._end - t) * len(steps.t) < 100_000 * (t - steps.t[0])
         return steps, good
 
     def keep(self, on: Mask, steps: Steps) -> None:
@@ -203,8 +189,11 @@ class LaneRun:
 
 
 def _padded(count: int) -> Index:
-    """Numbers of lanes, and the last one again up to a multiple of the width."""
-    return np.minimum(np.arange(-(-count // WIDTH) * WIDTH), count - 1)
+    """Numbers of lanes, and the last one again up to a multiple of eight.
+
+    A compiled function takes eight at once, and rounds what is left differently.
+    """
+    return np.minimum(np.arange(-(-count // 8) * 8), count - 1)
 
 
 def largest(t: Array, jets: Array, best: Array, there: There) -> Array:
@@ -224,7 +213,7 @@ def largest(t: Array, jets: Array, best: Array, there: There) -> Array:
     missed, surely = beyond(left, right), tops.copy()
     np.maximum.at(surely, lanes, height - missed)
     on = np.isfinite(height) & (height + missed >= surely[lanes])
-    for _ in range(MOST_ROUNDS):
+    for _ in range(20):
         at, lanes, left, right, times, height = at[on], lanes[on], left[:, on], right[:, on], times[on], height[on]
         if not lanes.size:
             return np.asarray(tops)
@@ -238,7 +227,7 @@ def largest(t: Array, jets: Array, best: Array, there: There) -> Array:
         near = NEAR * size[lanes]
         # what a polynomial misses grows with the cube of the distance from a point that it goes through
         part = np.abs(times - before) / room
-        sure = (part < CLOSE) & (missed * part**3 < near)
+        sure = (part < 0.01) & (missed * part**3 < near)
         np.maximum.at(tops, lanes[sure], height[sure])
         on = ~sure & (height + beyond(left, right) > tops[lanes] + near)
     tops[lanes[on]] = np.nan
@@ -277,7 +266,7 @@ def peak(left: Array, right: Array) -> tuple[Array, Array]:
     powers = np.array(quintic(length, left[1:], right[1:]))
     slope = np.arange(5, 0, -1)[:, None] * powers[:-1]
     bend = np.arange(4, 0, -1)[:, None] * slope[:-1]
-    places = np.linspace(0.0, 1.0, PLACES)[:, None]
+    places = np.linspace(0.0, 1.0, 7)[:, None]
     heights, slopes = np.polyval(powers, places), np.polyval(slope, places)
     turns = (slopes[:-1] > 0) & (slopes[1:] < 0)
     first = np.where(turns, np.maximum(heights[:-1], heights[1:]), -np.inf).argmax(axis=0)
@@ -285,9 +274,10 @@ def peak(left: Array, right: Array) -> tuple[Array, Array]:
     def slopes_at(chosen: Chosen, u: Array) -> tuple[Array, Array]:
         return np.polyval(slope[:, chosen], u), np.polyval(bend[:, chosen], u)
 
-    u = zeros(slopes_at, places[first, 0], places[first + 1, 0], rising=False, iterations=NEWTON)
+    u = zeros(slopes_at, places[first, 0], places[first + 1, 0], rising=False, iterations=5)
     height = np.where(turns.any(axis=0), np.polyval(powers, u), -np.inf)
-    return left[0] + np.clip(u, INSIDE, 1.0 - INSIDE) * length, height
+    # the motion is followed up to there, and not to the ends of the interval themselves
+    return left[0] + np.clip(u, 1e-4, 1.0 - 1e-4) * length, height
 
 
 @dataclass(frozen=True, eq=False)
@@ -334,7 +324,7 @@ def _hidden(t: Array, jets: Array, until: Index, there: There) -> tuple[list[int
     at, lanes = at[early], lanes[early]
     left, right = (np.array([t[k, lanes], *jets[:, k, lanes]]) for k in (at, at + 1))
     rises: tuple[list[int], list[int], list[float]] = [], [], []
-    for _ in range(MOST_ROUNDS):
+    for _ in range(20):
         if not lanes.size:
             break
         times, height = peak(left, right)
@@ -360,4 +350,4 @@ def _rise(low: Array, high: Array, at: Index, lanes: Index, there: There) -> Arr
         return value, slope
 
     nothing = ROUNDING * (np.abs(high) + ROUNDINGS * (high - low))
-    return zeros(course, low, high, iterations=MOST_ITERATIONS, xtol=nothing)
+    return zeros(course, low, high, iterations=100, xtol=nothing)

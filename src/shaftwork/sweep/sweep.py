@@ -38,8 +38,6 @@ from shaftwork.sweep.sweep_task import Chunk, Reader, Task, Worker, chunks
 LEFT = "a zero, an impact, a stiff motion or a change of mode that is not beyond doubt is left to `simulate`"
 """Why variants have left those beside them."""
 
-MOST_VARIANTS = 10_000_000
-"""Of a grid: so many take hours, and more are a typing error."""
 
 Measures = Mapping[str, "str | Callable[[Solution], float]"] | Iterable[str]
 
@@ -191,10 +189,11 @@ def _columns(netlist: Netlist, parameters: Any, samples: Any) -> dict[str, Array
 def _grid(values: Mapping[str, Array]) -> dict[str, Array]:
     """Every combination of values, the last name fastest."""
     count = math.prod(map(len, values.values()))
-    if count > MOST_VARIANTS:
+    most = 10_000_000  # so many take hours, and more are a typing error
+    if count > most:
         sizes = " x ".join(f"{len(column)}" for column in values.values())
         raise ParameterError(
-            f"A grid of {sizes} values has {count} variants, more than {MOST_VARIANTS}. Give fewer values, or draw "
+            f"A grid of {sizes} values has {count} variants, more than {most}. Give fewer values, or draw "
             "samples={...} of them."
         )
     grids = np.meshgrid(*values.values(), indexing="ij")

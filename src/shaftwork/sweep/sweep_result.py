@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from shaftwork.core.errors import ParameterError, imported
 from shaftwork.core.files import replaced
+from shaftwork.core.notebook import html_table
 from shaftwork.core.parameters import whole
 from shaftwork.core.screen import counted
 from shaftwork.results.observer import Array
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
 
 SHOWN = 12
 """Rows of a printed table."""
-MOST_LINES = 2000
-"""Lines of a picture; more would hide each other."""
 VERDICTS = ("passed", "reason")
 """Columns of the table behind those of parameters and measures."""
 
@@ -141,15 +140,24 @@ class Sweep:
         """
         return _parallel_coordinates(self, names)
 
-    def __str__(self) -> str:
-        names = [*self.parameters, *self.measures]
-        columns = {**self.parameters, **self.measures}
-        passed, shown = self.passed, range(min(len(self), SHOWN))
+    def _rows(self, count: int) -> tuple[str, list[str], list[list[str]]]:
+        """What is said of all variants, and headings and cells of the first ones."""
+        columns, passed = {**self.parameters, **self.measures}, self.passed
         rows = [
-            [f"{k}", *(f"{columns[name][k]:z.6g}" for name in names), "yes" if passed[k] else "no", self.reasons[k]]
-            for k in shown
+            [
+                f"{k}",
+                *(f"{values[k]:z.6g}" for values in columns.values()),
+                "yes" if passed[k] else "no",
+                self.reasons[k],
+            ]
+            for k in range(min(len(self), count))
         ]
-        header = ["", *names, "passed", "reason" if any(self.reasons) else ""]
+        failed = int(self.failed.sum())
+        counts = f"{self.name}: {counted(len(self), 'variant')}, {int(passed.sum())} passed, {failed} failed"
+        return counts, ["", *columns, "passed", "reason" if any(self.reasons) else ""], rows
+
+    def __str__(self) -> str:
+        counts, header, rows = self._rows(SHOWN)
         widths = [max(len(row[column]) for row in [header, *rows]) for column in range(len(header))]
         lines = [
             "  ".join(
@@ -158,9 +166,10 @@ class Sweep:
             for row in [header, *rows]
         ]
         more = [f"and {len(self) - SHOWN} more"] if len(self) > SHOWN else []
-        failed = int(self.failed.sum())
-        counts = f"{self.name}: {counted(len(self), 'variant')}, {int(passed.sum())} passed, {failed} failed"
         return "\n".join([counts, *lines, *more])
+
+    def _repr_html_(self) -> str:
+        return html_table(*self._rows(len(self)))
 
 
 def _parallel_coordinates(sweep: Sweep, names: tuple[str, ...]) -> Figure:
@@ -172,7 +181,7 @@ def _parallel_coordinates(sweep: Sweep, names: tuple[str, ...]) -> Figure:
     figure = new_figure("Sweep.plot()", 2.2 * max(len(shown), 2), 4.8)
     from matplotlib.collections import LineCollection
 
-    rows = np.flatnonzero(~sweep.failed)[:MOST_LINES]
+    rows = np.flatnonzero(~sweep.failed)[:2000]  # more lines would hide each other
     low = {name: float(columns[name][rows].min(initial=np.inf)) for name in shown} if rows.size else {}
     size = {name: (float(columns[name][rows].max()) - low[name]) or 1.0 for name in low}
     axes = figure.subplots()

@@ -50,8 +50,6 @@ SIDE_BY_SIDE = 16
 CHUNK, LONE_CHUNK = 2048, 8
 """Variants that are computed and stored at once: side by side, and one by one."""
 
-WORTH = 8.0
-"""Processes are started where what is left would take so long in s: each needs seconds to import and to compile."""
 
 Index = NDArray[np.intp]
 
@@ -230,9 +228,9 @@ class Worker:
 def _kind_of(model: Model) -> type[Ensemble]:
     """What runs variants of a network side by side."""
     if model.phased:
-        from shaftwork.sweep.phased_ensemble import PhasedEnsemble
+        from shaftwork.sweep.hybrid_ensemble import HybridEnsemble
 
-        return PhasedEnsemble
+        return HybridEnsemble
     from shaftwork.sweep.ensemble import Ensemble
 
     return Ensemble
@@ -280,7 +278,8 @@ def chunks(worker: Worker, task: Task, variants: Index, processes: int | None) -
         began = time.monotonic()
         yield worker.run(part)
         left = len(parts) - number - 1
-        if number and count > 1 and (time.monotonic() - began) * left > WORTH:  # the first one compiles
+        # Processes pay where more than 8 s are left: each needs seconds to import and to compile.
+        if number and count > 1 and (time.monotonic() - began) * left > 8.0:  # the first one compiles
             yield from _in_processes(task, parts[number + 1 :], count)
             return
 

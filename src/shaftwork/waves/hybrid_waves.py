@@ -1,8 +1,8 @@
 """Motions through phases beside travelling waves: what arrives follows the states.
 
-Between two events what arrives at the ends of the lines is known. So a moment has it behind its states, with its rates:
-x = (states, h, dh/dt), and everything that is read at an instant is read as without waves. One march of the delay
-engine goes through all sets of equations.
+Between two events what arrives at the ends of the lines is known. So a hybrid state has it behind its states, with its
+rates: x = (states, h, dh/dt), and everything that is read at an instant is read as without waves. One march of the
+delay engine goes through all sets of equations.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class WaveModeEquations(ModeEquations):
         return tuple(f"{name}.{label} arriving" for name, label in owners)
 
     def arriving(self, x: Array) -> dict[str, float]:
-        """What arrives, behind the states of a moment, and its rates, by name."""
+        """What arrives, behind the states, and its rates, by name."""
         names = (*self.ends, *(RATE + name for name in self.ends))
         return dict(zip(names, x[len(self.model.states) :].tolist(), strict=True))
 
@@ -97,10 +97,10 @@ class WaveRun:
 
     def solve(self, regime: Regime, problem: Problem) -> Trajectory:
         """One span of the motion, in the modes of a regime; states, and behind them what arrives."""
-        assembly = regime.assembly
-        system, x = WaveSystem(assembly.bound(regime.p)), problem.x0[: len(assembly.model.states)]
+        equations = regime.equations
+        system, x = WaveSystem(equations.bound(regime.p)), problem.x0[: len(equations.model.states)]
         delayed = delay_problem(
-            system, changed(problem, x0=x), self._start, timed=assembly.timed, linear=assembly.model.linear
+            system, changed(problem, x0=x), self._start, timed=equations.timed, linear=equations.model.linear
         )
         with np.errstate(all="ignore"):
             if self._march is None:

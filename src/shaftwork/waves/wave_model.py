@@ -32,14 +32,14 @@ class WaveModel(Model):
     def start(
         self, prepared: Prepared, initial: Mapping[str, float] | None, span: tuple[float, float]
     ) -> tuple[Array, Any]:
-        """The states (n,) at the start of a run, and the waves where they are not at rest; see `EngineModel.start`.
+        """The states (n,) at the start of a run, and the waves where they are not at rest; see `Model.start`.
 
         Warns:
             AccuracyWarning: the motion goes on without the waves that were on their way.
         """
         if initial is None and not self.form.has_impulses:
             return np.zeros(len(self.states)), None
-        after = self.just_after(prepared, span)
+        after = prepared.just_after(span)
         if isinstance(initial, Ending):
             if initial.waves is not None:
                 return prepared.taken_up(initial, after), initial.waves
@@ -67,10 +67,6 @@ class WaveModel(Model):
 
     def _steady(self, values: Mapping[str, float], t: float, initial: Given) -> SteadyState:
         return self.twin.steady_state(t, initial=initial, parameters=values)
-
-    def _linear_inputs(self, p: Array) -> None:  # noqa: ARG002
-        """None: no matrix holds a delay."""
-        return
 
     def _engine(self, prepared: Prepared, problem: Problem, engine: str) -> tuple[str, str]:  # noqa: ARG002
         return engine_of_waves(engine)

@@ -23,6 +23,7 @@ from shaftwork.formulation.form import StateForm
 from shaftwork.integrate.problem import Problem, TimedProblem, Trajectory
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import Netlist
+from shaftwork.numerics.tolerances import SAME
 from shaftwork.numerics.zeros import just_after
 from shaftwork.waves.delay_engine.collocation import POWERS
 from shaftwork.waves.delay_engine.engine import solve
@@ -33,10 +34,6 @@ from shaftwork.waves.wave_system import WaveSystem
 WHY = "Shafts are travelling waves, so states and delays are solved together."
 LIGHT = 0.1
 """Lumped bearing friction is light up to this fraction of the impedance: the torques are right to about 0.5 %."""
-SAME = 1e-12
-"""Impedances and delays that differ by less than this fraction are the same: another machine rounds otherwise."""
-MANY_PANELS = 2e5
-"""A march of so many panels takes minutes."""
 
 
 @dataclass(frozen=True)
@@ -280,7 +277,7 @@ def _warn_of_friction(bound: BoundArrays, impedances: Array) -> None:
 def _warn_of_short_lines(bound: BoundArrays, delays: Array, span: float) -> None:
     shortest = int(delays.argmin())
     panels = span / float(delays[shortest])
-    if panels > MANY_PANELS:
+    if panels > 2e5:  # minutes
         name = bound.program.form.graph.part_of(bound.program.form.waves[2 * shortest]).name
         warn(
             f"A wave crosses shaft '{name}' in {delays[shortest]:.2g} s, and beside nonlinear laws no panel is longer: "

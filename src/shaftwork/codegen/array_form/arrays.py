@@ -10,9 +10,9 @@ import numpy as np
 from scipy import sparse
 from sympy import Expr
 
+from shaftwork.codegen.array_form.algebraic_loops import LoopSolver
 from shaftwork.codegen.array_form.elements import Array, GainMatrix, node_matrix, rationals
 from shaftwork.codegen.array_form.inputs import Inputs, where
-from shaftwork.codegen.array_form.loops import LoopSolver
 from shaftwork.codegen.array_form.matrices import LinearPart, MatrixAssembly
 from shaftwork.codegen.code import vectorised
 from shaftwork.components.branches import ACROSS, INTEGRAL

@@ -26,13 +26,6 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 LINEAR = (Kind.ACROSS_STORE, Kind.THROUGH_STORE, Kind.CONDUCTANCE)
-FARTHEST = 1e100
-"""Sizes of coefficients in SI up to it, and down to its reciprocal: products of a few leave the range of floating-point
-numbers, as that of a shaft of 1e60 m, whose diameter counts to the fourth power."""
-ROUNDING = 1e-12
-"""Part of the largest value up to which others are rounding, such as what an elimination leaves."""
-SAME = 1e-9
-"""Part of the largest by which values that are typed, or end an iteration, may differ and be the same."""
 AT_ONCE = 2_000_000
 """Numbers of many instants or columns that are made at once, 16 MB."""
 FULL = 16_000
@@ -113,12 +106,15 @@ class Coefficients:
         with np.errstate(all="ignore"):
             for group, function in self._groups:
                 values[group.branches] = function(*p[group.places])
+        # Beyond it products of a few coefficients leave the range of floating-point numbers: the diameter of a shaft of
+        # 1e60 m counts to the fourth power.
+        farthest = 1e100
         sizes = np.abs(values)
-        if (beyond := np.flatnonzero(~((values == 0) | ((sizes >= 1 / FARTHEST) & (sizes <= FARTHEST))))).size:
+        if (beyond := np.flatnonzero(~((values == 0) | ((sizes >= 1 / farthest) & (sizes <= farthest))))).size:
             part = self._graph.part_of(int(beyond[0]))
             raise ParameterError(
                 f"{type(part.component).__name__} '{part.name}': its values make an inertia, a stiffness or a damping "
-                f"of {values[beyond[0]]:.3g} in SI, the equations take sizes from {1 / FARTHEST:g} to {FARTHEST:g}. "
+                f"of {values[beyond[0]]:.3g} in SI, the equations take sizes from {1 / farthest:g} to {farthest:g}. "
                 "Look for a value in a wrong unit."
             )
         return values

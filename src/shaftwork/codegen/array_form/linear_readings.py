@@ -11,9 +11,9 @@ import numpy as np
 from scipy import sparse
 
 from shaftwork.codegen.array_form.arrays import BoundArrays
-from shaftwork.codegen.array_form.elements import ROUNDING, Array, Factor, blocks
+from shaftwork.codegen.array_form.elements import Array, Factor, blocks
 from shaftwork.codegen.array_form.recovery import BranchHistory, GivenHistory
-from shaftwork.codegen.timeline import GOLDEN
+from shaftwork.numerics.tolerances import GOLDEN, SAME
 
 Read = Callable[[BranchHistory], Array]
 
@@ -140,7 +140,7 @@ class GivenSpeeds:
 
 def _is_nothing(speeds: Array, history: BranchHistory) -> Any:
     """Whether speeds are rounding beside the largest one of their column."""
-    return np.abs(speeds) <= ROUNDING * np.abs(history.across).max(axis=0, initial=0.0)
+    return np.abs(speeds) <= SAME * np.abs(history.across).max(axis=0, initial=0.0)
 
 
 def _any_numbers(count: int) -> Array:
@@ -170,7 +170,7 @@ class LinearReadings:
         values = self._values(quantities, others)
         largest = {True: np.abs(others.across), False: np.abs(others.through)}
         sizes = np.array([largest[q.is_across].max(axis=0, initial=0.0) for q in quantities])
-        moved: Any = (np.abs(values) - ROUNDING * sizes)[:, 1:].max(axis=1) > 0
+        moved: Any = (np.abs(values) - SAME * sizes)[:, 1:].max(axis=1) > 0
         return [LinearRow(by_state[k], float(values[k, 0]), bool(moved[k])) for k in range(len(quantities))]
 
     def states_behind(self, quantities: Sequence[LinearQuantity]) -> list[int]:
@@ -179,7 +179,7 @@ class LinearReadings:
             return []
         values = np.hstack([self._values(quantities, columns) for columns in self._by_states(moving=True)])
         size = np.abs(values).max(axis=1, keepdims=True, initial=0.0)
-        return [int(k) for k in np.flatnonzero((np.abs(values) > ROUNDING * size).any(axis=0))]
+        return [int(k) for k in np.flatnonzero((np.abs(values) > SAME * size).any(axis=0))]
 
     def given_speeds(self, x: Array, rest: Array, is_given: Any, prescribed: Sequence[LinearQuantity]) -> GivenSpeeds:
         """Which speeds start values give.

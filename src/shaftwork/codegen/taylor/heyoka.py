@@ -15,15 +15,12 @@ import sympy
 from numpy.typing import NDArray
 
 from shaftwork.codegen.array_form.elements import Array
-from shaftwork.codegen.compiled_model import SCALAR
 from shaftwork.codegen.taylor.heyoka_parameters import Fixed, HeldParameters
 from shaftwork.components.discontinuities import parts
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.calls import interruptible
 from shaftwork.core.errors import MissingExtraError
-
-# For so long in s an event that has just been met is not met again.
-COOLDOWN = 1e-9
+from shaftwork.formulation.explicit_rows import SCALAR
 
 
 class Fading(NamedTuple):
@@ -274,8 +271,9 @@ class HeyokaProgram:
         def ask(_integrator: Any, _direction: int) -> bool:
             return bool(listeners) and listeners[-1](number)
 
-        # heyoka's own cooldown grows with the tolerance, and hides what follows soon
-        return heyoka.t_event(met, direction=heyoka.event_direction.positive, callback=ask, cooldown=COOLDOWN)
+        # An event that has just been met is not met again for 1 ns: heyoka's own cooldown grows with the tolerance, and
+        # hides what follows soon.
+        return heyoka.t_event(met, direction=heyoka.event_direction.positive, callback=ask, cooldown=1e-9)
 
     def _leaves_its_side(self, number: int, switch: Any) -> Any:
         """The event that a switch leaves the side that its sign says."""

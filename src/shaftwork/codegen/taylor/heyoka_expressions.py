@@ -51,9 +51,6 @@ COMPARISONS: dict[Any, Callable[[Any, Any], Any]] = {
 
 # Far from zero these are a constant to the last bit, so that a series does not show where they change.
 FADING = (sympy.tanh, sympy.coth, sympy.sech, sympy.csch, sympy.exp)
-# A power |u|^1.5 has no series at zero. Within this distance of zero, in the unit of u, it is rounded, and changes by
-# less than this part of its value at u = 1.
-ROUNDED_NEAR_ZERO = 1e-18
 
 
 class Translator:
@@ -168,7 +165,9 @@ class Translator:
     def _smooth_power(self, node: sympy.Pow) -> Any:
         """A power |u|^a = (u^2 + e^2)^(a/2), with a tiny e, which has a series at zero as well."""
         base = self.expression(node.base.args[0])
-        return (base * base + ROUNDED_NEAR_ZERO**2) ** heyoka.expression(float(node.exp) / 2)
+        # A power |u|^1.5 has no series at zero. Within 1e-18 of zero, in the unit of u, it is rounded, and changes by
+        # less than this part of its value at u = 1.
+        return (base * base + 1e-18**2) ** heyoka.expression(float(node.exp) / 2)
 
     def sign(self, switch: sympy.Expr) -> Any:
         """The sign of an expression: -1, 0 or 1; a parameter that an event changes where the sign may change."""

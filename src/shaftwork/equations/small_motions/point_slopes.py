@@ -25,8 +25,6 @@ VARIED = Symbol("varied", real=True)
 """Stands for what a law that jumps reads."""
 FRACTION_DIGITS = 40
 """Decimal digits with which numbers that are no fractions, as pi, become fractions: far more than floats have."""
-NEARBY, JUMP = 1e-9, 1e-6
-"""A law jumps where it changes so near a point by more than this part of itself, beside what its slope tells."""
 
 Values = Mapping[str, float]
 
@@ -157,9 +155,11 @@ def _jumps(slope: Slope, numbers: Mapping[Symbol, Rational], value: float) -> bo
     if slope.jumps is None:
         return False
     at = float(slope.by.xreplace(dict(numbers)))
-    step = NEARBY * max(abs(at), 1.0)
+    # A law jumps where it changes so near the point by more than this part of itself, beside what its slope tells.
+    nearby, jump = 1e-9, 1e-6
+    step = nearby * max(abs(at), 1.0)
     below, above = (float(slope.jumps.xreplace({**numbers, VARIED: Float(at + by)})) for by in (-step, step))
-    return abs(above - below - 2 * step * value) > JUMP * max(abs(above), abs(below))
+    return abs(above - below - 2 * step * value) > jump * max(abs(above), abs(below))
 
 
 def _finite(name: str, value: Any) -> float:

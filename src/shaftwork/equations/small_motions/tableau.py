@@ -45,12 +45,6 @@ Polynomial = Any
 """An element of a ring of sympy's sparse polynomials."""
 Numbers = dict[Symbol, Rational]
 """Values of symbols."""
-MOST_TERMS = 5_000
-"""Terms of the minors on the way to a determinant; one of more is longer than anyone reads, and takes minutes."""
-MOST_NUMBERS = 200_000
-"""Terms of the minors where these are polynomials in s alone."""
-SHORT = 600
-"""Terms of a quotient up to which all common factors are looked for: it takes seconds."""
 
 
 def linear_form(equations: Equations, slopes: LawSlopes) -> StateForm:
@@ -239,7 +233,8 @@ def quotient(rows: Mapping[Symbol, Sum], read: Sum, numbers: Numbers | None) -> 
     in_order = iter(polynomials)
     matrix = [{column: next(in_order) for column in row} for row, _ in cleared]
     inner = [{column: entry for column, entry in row.items() if column < len(rows)} for row in matrix[:-1]]
-    most = MOST_TERMS if numbers is None else MOST_NUMBERS
+    # Terms of the minors on the way: with letters, more are longer than anyone reads and take minutes.
+    most = 5_000 if numbers is None else 200_000
     return _reduced(_determinant(matrix, ring.one, most), _determinant(inner, ring.one, most) * factor)
 
 
@@ -344,7 +339,8 @@ def _reduced(above: Polynomial, below: Polynomial) -> tuple[Polynomial, Polynomi
         TooManyTermsError: a long one has such a factor.
     """
     ring = above.ring
-    if not (above and below) or len(above) + len(below) <= SHORT or ring.ngens == 1:
+    # All common factors of 600 terms take seconds to find.
+    if not (above and below) or len(above) + len(below) <= 600 or ring.ngens == 1:
         return above.cancel(below) if below else (above, below)
     powers = np.min([*above.itermonoms(), *below.itermonoms()], axis=0)
     above, below = (p.exquo(ring.term_new(tuple(powers.tolist()), ring.domain.one)) for p in (above, below))

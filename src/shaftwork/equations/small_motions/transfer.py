@@ -35,8 +35,6 @@ from shaftwork.formulation.source_inputs import places_of, with_inputs
 if TYPE_CHECKING:
     from shaftwork.equations.records import Equations
 
-STEPS, EXTRA = 1000, 10
-"""Steps in which roots are improved, and the binary digits more for each of them: what cancels in a polynomial."""
 
 Complex = NDArray[np.complex128]
 
@@ -258,7 +256,8 @@ def _simple_roots(polynomial: Poly) -> list[complex]:
         size = (abs(last / numbers[0])) ** (mpf(1) / degree)  # of the roots, all in all
         scaled = [c * size ** (degree - k) for k, c in enumerate(numbers)]
         guesses = np.roots([float(c / scaled[0]) for c in scaled])
-        roots = polyroots(scaled, maxsteps=STEPS, extraprec=EXTRA * degree, roots_init=guesses.tolist())
+        # About ten binary digits cancel in a polynomial for each of its roots.
+        roots = polyroots(scaled, maxsteps=1000, extraprec=10 * degree, roots_init=guesses.tolist())
         return [complex(root * size) for root in roots]
 
 

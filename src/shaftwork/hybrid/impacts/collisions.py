@@ -31,18 +31,19 @@ from shaftwork.components.branches import ACROSS
 from shaftwork.components.modes import Leave
 from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import SimulationError
-from shaftwork.hybrid.hybrid_state import CLEAR, NOTHING, HybridState, Regime
+from shaftwork.hybrid.consistency import CLEAR, NOTHING
+from shaftwork.hybrid.hybrid_state import HybridState, Regime
+from shaftwork.hybrid.hybrid_transfer import HybridTransfer
 from shaftwork.hybrid.impacts.impulses import NOTHING_OF, Blow, ImpactStage, ImpactStart, Impulses, summed
 from shaftwork.hybrid.modes.mode_equations import KEPT
 from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, GivesWay, ModeMachine, ModeNames, limited, with_modes
-from shaftwork.hybrid.phases import Regimes
 
 
 class Contact(NamedTuple):
     """What cannot close further, be it closed or only touching.
 
     Args:
-        number: of the element.
+        number: of the machine.
         side: 1 where it opens as the speed across it rises, -1 where as that falls.
         apart: mode in which it is open.
         joined: mode in which it is closed.
@@ -64,70 +65,70 @@ class Contact(NamedTuple):
         return self.restitution if -opens * self.restitution > self.rest else 0.0
 
 
-def lasting(elements: Sequence[ModeMachine], modes: ModeNames) -> Iterator[Contact]:
+def lasting(machines: Sequence[ModeMachine], modes: ModeNames) -> Iterator[Contact]:
     """Contacts that are closed, and freewheels."""
-    for k, (element, name) in enumerate(zip(elements, modes, strict=True)):
-        mode = element.modes[name]
-        if (side := element.opening_side(name)) is not None:
+    for k, (machine, name) in enumerate(zip(machines, modes, strict=True)):
+        mode = machine.modes[name]
+        if (side := machine.opening_side(name)) is not None:
             yield Contact(k, side, mode.gives_way[0][1], name)
         for leave in mode.leaves:
-            side = element.opening_side(leave.to) if leave.to and leave.when == ACROSS else None
+            side = machine.opening_side(leave.to) if leave.to and leave.when == ACROSS else None
             if side is not None:
                 yield Contact(k, side, name, leave.to, leave)
 
 
-def touching(t: float, moment: HybridState, number: int, leave: Leave) -> Iterator[Contact]:
-    """Contacts that are closed or touch, freewheels, and the element of a number, which wants to close by a `leave`."""
-    regime, here = moment.regime, moment.course(t)
-    elements, now, bands = regime.elements, here[3], regime.bands(here)
-    closed = [*lasting(elements, regime.modes)]
+def touching(t: float, state: HybridState, number: int, leave: Leave) -> Iterator[Contact]:
+    """Contacts that are closed or touch, freewheels, and the machine of a number, which wants to close by a `leave`."""
+    regime, here = state.regime, state.course(t)
+    machines, now, bands = regime.machines, here[3], regime.bands(here)
+    closed = [*lasting(machines, regime.modes)]
     yield from closed
-    yield from _other_flanks(moment, closed)
+    yield from _other_flanks(state, closed)
     for active in regime.watched:
-        k, closes, guard = active.element, active.leave, active.guard
+        k, closes, guard = active.machine, active.leave, active.guard
         wants = k == number and closes.to == leave.to
         touches = closes.rebound is not None and active.side * now[guard] > -CLEAR * bands[guard]
-        side = elements[k].opening_side(closes.to) if (wants or touches) and closes.to else None
+        side = machines[k].opening_side(closes.to) if (wants or touches) and closes.to else None
         if side is not None and not any(c.number == k and c.joined == closes.to for c in closed):
-            yield _closing(moment, k, side, leave if wants else closes)
+            yield _closing(state, k, side, leave if wants else closes)
 
 
-def _other_flanks(moment: HybridState, closed: Sequence[Contact]) -> Iterator[Contact]:
-    """Flanks that touch while the other one of their element is closed, as there is no gap between them."""
-    regime = moment.regime
+def _other_flanks(state: HybridState, closed: Sequence[Contact]) -> Iterator[Contact]:
+    """Flanks that touch while the other one of their machine is closed, as there is no gap between them."""
+    regime = state.regime
     for contact in closed:
-        element, place = regime.elements[contact.number], regime.assembly.twist(contact.number)
-        for leave in element.modes[contact.apart].leaves if place is not None else ():
+        machine, place = regime.machines[contact.number], regime.equations.twist(contact.number)
+        for leave in machine.modes[contact.apart].leaves if place is not None else ():
             if leave.rebound is None or leave.to == contact.joined:
                 continue
-            side, (limit, slope) = element.opening_side(leave.to), regime.twist_limit(contact.number, leave)
-            if side is not None and slope * (moment.x[place] - limit) > -NOTHING:
-                yield _closing(moment, contact.number, side, leave, contact.apart)
+            side, (limit, slope) = machine.opening_side(leave.to), regime.twist_limit(contact.number, leave)
+            if side is not None and slope * (state.x[place] - limit) > -NOTHING:
+                yield _closing(state, contact.number, side, leave, contact.apart)
 
 
-def _closing(moment: HybridState, number: int, side: float, leave: Leave, apart: str = "") -> Contact:
+def _closing(state: HybridState, number: int, side: float, leave: Leave, apart: str = "") -> Contact:
     """What closes by a `leave` from the mode that it is in, or from another one in which it is apart."""
-    restitution, rest = (moment.regime.constant(number, expression) for expression in (leave.rebound, leave.rest))
-    return Contact(number, side, apart or moment.regime.modes[number], leave.to, leave, restitution, rest)
+    restitution, rest = (state.regime.constant(number, expression) for expression in (leave.rebound, leave.rest))
+    return Contact(number, side, apart or state.regime.modes[number], leave.to, leave, restitution, rest)
 
 
-def nodes(moment: HybridState, contact: Contact) -> tuple[int, int]:
+def nodes(state: HybridState, contact: Contact) -> tuple[int, int]:
     """The nodes of a contact, that first whose speed opens it."""
-    element = moment.regime.elements[contact.number]
-    part = moment.regime.assembly.parts[element.part.name]
-    first, second = map(part.node_at, part.ends_of(element.modes)[:: int(contact.side)])
+    machine = state.regime.machines[contact.number]
+    part = state.regime.equations.parts[machine.part.name]
+    first, second = map(part.node_at, part.ends_of(machine.modes)[:: int(contact.side)])
     return first, second
 
 
-def opens_at(t: float, moment: HybridState, contacts: Sequence[Contact]) -> list[float]:
+def opens_at(t: float, state: HybridState, contacts: Sequence[Contact]) -> list[float]:
     """The speeds at which contacts open."""
-    speeds = moment.speeds([contact.number for contact in contacts], t)
+    speeds = state.speeds([contact.number for contact in contacts], t)
     return [contact.side * speed for contact, speed in zip(contacts, speeds, strict=True)]
 
 
-def in_turn(t: float, moment: HybridState, contacts: list[Contact]) -> list[Contact]:
+def in_turn(t: float, state: HybridState, contacts: list[Contact]) -> list[Contact]:
     """The contacts that take part where impacts follow each other: of those that throw back only the fastest."""
-    speeds = {c: -opens for c, opens in zip(contacts, opens_at(t, moment, contacts), strict=True)}
+    speeds = {c: -opens for c, opens in zip(contacts, opens_at(t, state, contacts), strict=True)}
     thrown = [speed for c, speed in speeds.items() if c.share_back(-speed)]
     fastest = (1 - NO_IMPACT) * max(thrown, default=0.0)
     return [c for c, speed in speeds.items() if not (thrown and c.restitution) or speed >= fastest]
@@ -138,8 +139,8 @@ class Collision(NamedTuple):
 
     Args:
         after: what follows it.
-        stays: elements that close in it and stay so.
-        thrown: elements that are thrown back.
+        stays: machines that close in it and stay so.
+        thrown: machines that are thrown back.
         lost: energy in J that is lost, by part.
         given: energy in J that prescribed speeds give, by part.
     """
@@ -155,43 +156,43 @@ class Collisions:
     """Solves impacts.
 
     Args:
-        regimes: combinations of modes.
+        transfer: from one combination of modes to another.
         impulses: follows what passes through gears that rub.
         together: whether what touches is thrown back in the same instant as what is hit, and not after it.
     """
 
-    def __init__(self, regimes: Regimes, impulses: Impulses, *, together: bool) -> None:
-        self._regimes, self._elements = regimes, regimes.elements
+    def __init__(self, transfer: HybridTransfer, impulses: Impulses, *, together: bool) -> None:
+        self._transfer, self._machines = transfer, transfer.machines
         self._impulses, self._together = impulses, together
         self._mobilities = BoundedCache[tuple[Regime, tuple[tuple[int, int], ...]], Mobility](KEPT)
 
-    def impact(self, t: float, moment: HybridState, number: int, leave: Leave) -> Collision:
-        """The impact of an element that closes.
+    def impact(self, t: float, state: HybridState, number: int, leave: Leave) -> Collision:
+        """The impact of a machine that closes.
 
         Args:
             t: time in s at which inputs are read.
-            moment: what was before.
-            number: of the element.
+            state: what was before.
+            number: of the machine.
             leave: by which it closes.
 
         Raises:
             NetworkError: nothing stops what is prescribed; says what contradicts what.
             SimulationError: flanks without a gap between them lose nothing.
         """
-        modes = moment.regime.modes
+        modes = state.regime.modes
 
         def is_wanted(contact: Contact) -> bool:
             return (contact.number, contact.joined) == (number, leave.to)
 
-        # without a gap the other flank of the element touches too; of two that are closed the last one tells the mode
-        candidates = sorted(touching(t, moment, number, leave), key=is_wanted)
-        meets = -min(opens_at(t, moment, candidates), default=0.0) > NOTHING_OF * moment.top_speed
-        contacts = in_turn(t, moment, candidates) if meets and not self._together else candidates
-        before = np.array(opens_at(t, moment, contacts))
+        # without a gap the other flank of the machine touches too; of two that are closed the last one tells the mode
+        candidates = sorted(touching(t, state, number, leave), key=is_wanted)
+        meets = -min(opens_at(t, state, candidates), default=0.0) > NOTHING_OF * state.top_speed
+        contacts = in_turn(t, state, candidates) if meets and not self._together else candidates
+        before = np.array(opens_at(t, state, contacts))
         back = np.array([meets * c.share_back(u) for c, u in zip(contacts, before.tolist(), strict=True)])
         elastic = {c.number for c, share in zip(contacts, back.tolist(), strict=True) if share >= 1}
         self._refuse_no_gap(t, elastic, candidates)
-        begins, stages = self._apart(t, moment, modes, contacts), tuple[ImpactStage, ...]()
+        begins, stages = self._apart(t, state, modes, contacts), tuple[ImpactStage, ...]()
         both_ways = tuple[Contact, ...]()
         if all(contact.number != number for contact in contacts):  # it carries both ways, as a switch that closes
             both_ways = (Contact(number, 0.0, modes[number], leave.to),)
@@ -204,7 +205,7 @@ class Collisions:
         pressed = zip(contacts, _pressed(stages), strict=True)
         hit = [c for c, impulse in pressed if c.leave and ((meets and impulse > 0) or is_wanted(c))]
         after, closed, further = self._ended(t, modes, contacts, stages, least, hit)
-        owners = (self._elements[contact.number].part.name for contact in contacts)
+        owners = (self._machines[contact.number].part.name for contact in contacts)
         taken = [{part: lost} for part, lost in zip(owners, self._taken(t, contacts, stages).tolist(), strict=True)]
         stages += further
         lost = summed([*taken, self._impulses.lost(t, stages)])
@@ -221,23 +222,23 @@ class Collisions:
         for number in elastic:
             if numbers.count(number) > 1:
                 raise SimulationError(
-                    f"The flanks of '{self._elements[number].name}' have no gap between them and hit each other for "
+                    f"The flanks of '{self._machines[number].name}' have no gap between them and hit each other for "
                     f"ever at t = {t:.9g} s, as they lose nothing. Give it a gap, or a restitution below 1."
                 )
 
     def pulled(
-        self, before: float, t: float, moment: HybridState, modes: ModeNames, least: float
+        self, before: float, t: float, state: HybridState, modes: ModeNames, least: float
     ) -> tuple[HybridState, tuple[ImpactStage, ...]]:
         """What follows where prescribed speeds jump or gears jam: what is closed takes it up or opens.
 
         Args:
             before, t: times in s just before and just after it, at which inputs are read.
-            moment: what was before.
+            state: what was before.
             modes: that are to go on.
-            least: speed up to which an element stays as it is.
+            least: speed up to which a machine stays as it is.
         """
-        contacts = [*lasting(self._elements, modes)]
-        start = self._apart(before, moment, modes, contacts)
+        contacts = [*lasting(self._machines, modes)]
+        start = self._apart(before, state, modes, contacts)
         stages = self._compressed(t, start, contacts)
         hit = [c for c, i in zip(contacts, _pressed(stages), strict=True) if i > 0]
         after, _, further = self._ended(t, modes, contacts, stages, least, hit)
@@ -266,7 +267,7 @@ class Collisions:
         open_yet = [c for c in closed if c.number in massless and c.leave is None]
         pressed = [c for c in closed if c not in open_yet]
         new, apart = (
-            self._regimes.changed(after, t, with_modes(modes, {c.number: c.joined for c in some}))
+            self._transfer.to_modes(after, t, with_modes(modes, {c.number: c.joined for c in some}))
             for some in (closed, pressed)
         )
         if not open_yet or not new.differs(apart, t, least):
@@ -287,14 +288,14 @@ class Collisions:
         """Until nothing closes any more, with all contacts open; where nothing stops them, what closes is joined."""
 
         def compressed(start: ImpactStart, _: Sequence[ImpactStage]) -> Blow:
-            modes = start.moment.regime.modes
-            moment = start.moment if start.t == t else self._regimes.taking(modes, t, start.stored)
-            mobility, opens = self._mobility(t, moment, contacts)
+            modes = start.state.regime.modes
+            state = start.state if start.t == t else self._transfer.with_stored(modes, t, start.stored)
+            mobility, opens = self._mobility(t, state, contacts)
             impulses = complementary(mobility.W, opens)
             if impulses is not None:
-                return _blow(moment, mobility, impulses)
+                return _blow(state, mobility, impulses)
             closing = {c.number: c.joined for c, u in zip(contacts, opens, strict=True) if u < 0}
-            joined = self._regimes.changed(moment, t, with_modes(modes, closing))
+            joined = self._transfer.to_modes(state, t, with_modes(modes, closing))
             return Blow(joined, joined.regime, np.zeros(len(contacts)))
 
         return self._impulses.stages(t, begins, compressed)
@@ -303,7 +304,7 @@ class Collisions:
         """Elements are joined at once, by what impulses it takes."""
 
         def joined(start: ImpactStart, _: Sequence[ImpactStage]) -> Blow:
-            after = self._regimes.changed(start.moment, t, with_modes(start.moment.regime.modes, joins))
+            after = self._transfer.to_modes(start.state, t, with_modes(start.state.regime.modes, joins))
             return Blow(after, after.regime)
 
         return self._impulses.stages(t, begins, joined)
@@ -321,12 +322,12 @@ class Collisions:
         def thrown(start: ImpactStart, stages: Sequence[ImpactStage]) -> Blow:
             left = energy
             for begun, share in (*((stage.start, stage.share) for stage in stages), (start, 0.0)):
-                mobility, opens = self._mobility(t, begun.moment, contacts)
+                mobility, opens = self._mobility(t, begun.state, contacts)
                 impulses = _of_energy(left, shares, opens, mobility.W)
                 gives = share * impulses
                 left -= float(gives @ (opens + mobility.W @ gives / 2))
             further = complementary(mobility.W, np.maximum(opens, 0.0) + mobility.W @ impulses)
-            return _blow(start.moment, mobility, impulses if further is None else impulses + further)
+            return _blow(start.state, mobility, impulses if further is None else impulses + further)
 
         return self._impulses.stages(t, self._impulses.begins(compression[-1].blow.after, t), thrown)
 
@@ -335,7 +336,7 @@ class Collisions:
         energy, opens = 0.0, np.zeros(len(contacts))
         for start, blow, share in reversed(stages):
             impulses = back * share * blow.pressed
-            gains = self._mobility(t, start.moment, contacts)[0].W @ impulses
+            gains = self._mobility(t, start.state, contacts)[0].W @ impulses
             energy += float(impulses @ (opens + gains / 2))
             opens += gains
         return energy
@@ -344,21 +345,21 @@ class Collisions:
         """(contacts,) energy in J that contacts take up: their impulses at the mean of their closing speeds."""
         taken = np.zeros(len(contacts))
         for start, blow, share in stages:
-            began, ends = (opens_at(t, one, contacts) for one in (start.moment, blow.after))
+            began, ends = (opens_at(t, one, contacts) for one in (start.state, blow.after))
             taken -= share * blow.pressed * (np.array(began) + share / 2 * np.subtract(ends, began))
         # what opens before others close it comes late, and gives nothing: the sum alone is physics
         least = np.maximum(taken, 0.0)
         return least * (taken.sum() / least.sum()) if least.any() else taken
 
-    def _apart(self, t: float, moment: HybridState, modes: ModeNames, contacts: Sequence[Contact]) -> ImpactStart:
-        """The moment in some modes, but with all contacts open, and what rubs slipping."""
+    def _apart(self, t: float, state: HybridState, modes: ModeNames, contacts: Sequence[Contact]) -> ImpactStart:
+        """The state in some modes, but with all contacts open, and what rubs slipping."""
         apart = {k: sides[0][1] for k, sides in self._rubbing(modes).items()} | {c.number: c.apart for c in contacts}
         loose = with_modes(modes, apart)
-        return self._impulses.begins(self._regimes.taking(loose, t, moment.stored(t)), t)
+        return self._impulses.begins(self._transfer.with_stored(loose, t, state.stored(t)), t)
 
     def _rubbing(self, modes: ModeNames) -> dict[int, GivesWay]:
         """Elements that hold by torques limited on both sides, with the modes to which these lead."""
-        return {k: sides for k, sides in limited(self._elements, modes).items() if len(sides) > 1}
+        return {k: sides for k, sides in limited(self._machines, modes).items() if len(sides) > 1}
 
     def _slipping(self, t: float, before: ModeNames, after: HybridState, least: float) -> dict[int, str]:
         """The modes of what rubs after an impact: it slips where the speed across it is more than the least."""
@@ -368,17 +369,17 @@ class Collisions:
             k: next((to for side, to in sides if side * speeds[k] > least), before[k]) for k, sides in rubbing.items()
         }
 
-    def _mobility(self, t: float, moment: HybridState, contacts: Sequence[Contact]) -> tuple[Mobility, Array]:
+    def _mobility(self, t: float, state: HybridState, contacts: Sequence[Contact]) -> tuple[Mobility, Array]:
         """The answer to impulses of contacts, and the speeds at which they open; zero where no impulse passes."""
-        regime, pairs = moment.regime, tuple(nodes(moment, contact) for contact in contacts)
+        regime, pairs = state.regime, tuple(nodes(state, contact) for contact in contacts)
         stores, p = regime.stores, regime.p
-        mobility = self._mobilities((regime, pairs), lambda: stores.mobility(regime.assembly.bound(p), pairs))
-        return mobility, np.where(mobility.has_inertia, opens_at(t, moment, contacts), 0.0)
+        mobility = self._mobilities((regime, pairs), lambda: stores.mobility(regime.equations.bound(p), pairs))
+        return mobility, np.where(mobility.has_inertia, opens_at(t, state, contacts), 0.0)
 
 
-def _blow(moment: HybridState, mobility: Mobility, impulses: Array) -> Blow:
+def _blow(state: HybridState, mobility: Mobility, impulses: Array) -> Blow:
     """What impulses (contacts,) lead to."""
-    after = moment._replace(x=mobility.moved(moment.x, impulses))
+    after = state._replace(x=mobility.moved(state.x, impulses))
     return Blow(after, after.regime, impulses, mobility.through(impulses))
 
 

@@ -19,10 +19,12 @@ from shaftwork.codegen.array_form.recovery import BranchHistory
 from shaftwork.components.branches import ACROSS, through_of
 from shaftwork.components.modes import Leave, Mode
 from shaftwork.core.errors import NetworkError, SimulationError
-from shaftwork.hybrid.hybrid_state import EPS, ROUNDINGS, HybridState, Regime
+from shaftwork.hybrid.consistency import ROUNDINGS
+from shaftwork.hybrid.hybrid_state import HybridState, Regime
+from shaftwork.hybrid.hybrid_transfer import HybridTransfer
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import ModeNames, with_modes
-from shaftwork.hybrid.phases import Regimes
+from shaftwork.numerics.tolerances import EPS
 
 MOST_STAGES = 100
 """So many times gears may come to rest in one impact."""
@@ -49,7 +51,7 @@ class Blow(NamedTuple):
 class ImpactStart(NamedTuple):
     """Where a part of an impact begins: all that is stored, and the speeds of gears; its inputs are those of a time."""
 
-    moment: HybridState
+    state: HybridState
     t: float
     stored: Mapping[str, float]
     speeds: Mapping[int, float]
@@ -67,18 +69,18 @@ class Impulses:
     """Follows impulses through gears.
 
     Args:
-        regimes: combinations of modes.
+        transfer: from one combination of modes to another.
     """
 
-    def __init__(self, regimes: Regimes) -> None:
-        self._regimes, self._elements = regimes, regimes.elements
-        self.gears = tuple(k for k, element in enumerate(self._elements) if element.modes.passes_on)
+    def __init__(self, transfer: HybridTransfer) -> None:
+        self._transfer, self._machines = transfer, transfer.machines
+        self.gears = tuple(k for k, machine in enumerate(self._machines) if machine.modes.passes_on)
         """Elements that pass torques on by their direction."""
 
-    def begins(self, moment: HybridState, t: float) -> ImpactStart:
+    def begins(self, state: HybridState, t: float) -> ImpactStart:
         """Where an impact begins, with the inputs of a time in s."""
-        speeds = dict(zip(self.gears, moment.speeds(self.gears, t), strict=True))
-        return ImpactStart(moment, t, moment.stored(t), speeds)
+        speeds = dict(zip(self.gears, state.speeds(self.gears, t), strict=True))
+        return ImpactStart(state, t, state.stored(t), speeds)
 
     def stages(
         self, t: float, start: ImpactStart, blow: Callable[[ImpactStart, Sequence[ImpactStage]], Blow]
@@ -103,7 +105,7 @@ class Impulses:
             modes = self._at_rest(rest.after.regime.modes, number)
             start = self._reached(t, stages[-1], modes, number)
         raise SimulationError(
-            f"'{self._elements[number].name}' comes to rest again and again in one impact at t = {t:.9g} s. Give the "
+            f"'{self._machines[number].name}' comes to rest again and again in one impact at t = {t:.9g} s. Give the "
             "contact that is hit a stiffness c and a damping d."
         )
 
@@ -115,27 +117,27 @@ class Impulses:
             for (name, value), gain in zip(start.stored.items(), self._gained(t, start, blow).values(), strict=True)
         }
         speeds = {k: v + share * (blow.after.across(k, t) - v) for k, v in start.speeds.items()}
-        return ImpactStart(self._regimes.taking(modes, t, stored), t, stored, {**speeds, number: 0.0})
+        return ImpactStart(self._transfer.with_stored(modes, t, stored), t, stored, {**speeds, number: 0.0})
 
     def _in_modes(self, t: float, start: ImpactStart, modes: ModeNames) -> ImpactStart:
         """The same start in other modes of gears; one that jams has stopped in it."""
-        new = ImpactStart(self._regimes.taking(modes, t, start.stored), t, start.stored, start.speeds)
-        halted = {*self._stopped(new.moment)} - {*self._stopped(start.moment)}
-        return self.begins(new.moment, t) if any(start.speeds[k] for k in halted) else new
+        new = ImpactStart(self._transfer.with_stored(modes, t, start.stored), t, start.stored, start.speeds)
+        halted = {*self._stopped(new.state)} - {*self._stopped(start.state)}
+        return self.begins(new.state, t) if any(start.speeds[k] for k in halted) else new
 
     def _consistent(
         self, t: float, start: ImpactStart, blow: Callable[[ImpactStart], Blow]
     ) -> tuple[ImpactStart, Blow]:
         """The modes of gears in which an impulse passes as they say; a gear that turns, and has none, jams at once."""
-        rest, jammed, seen = self._passed(start, blow), set[int](), {start.moment.regime.modes}
+        rest, jammed, seen = self._passed(start, blow), set[int](), {start.state.regime.modes}
         while True:
-            if rest is None or rest.after is start.moment:
+            if rest is None or rest.after is start.state:
                 start, rest = self._released(t, start, blow) or (start, rest or blow(start))
             turn = self._turned(t, start, rest)
             if turn is None:
                 return start, rest
             number, to = turn
-            modes = self._led(start.moment.regime.modes, number, to)
+            modes = self._led(start.state.regime.modes, number, to)
             if modes in seen:
                 if number in jammed:
                     return start, rest
@@ -151,7 +153,7 @@ class Impulses:
         try:
             return blow(start)
         except NetworkError:
-            if not self._stopped(start.moment):
+            if not self._stopped(start.state):
                 raise
             return None
 
@@ -162,36 +164,36 @@ class Impulses:
 
         It is one of which the modes say so as well.
         """
-        for k in self._stopped(start.moment):
-            turning = (mode.name for mode in self._elements[k].modes.options if _turns(mode))
-            options = (with_modes(start.moment.regime.modes, {k: name}) for name in turning)
-            for modes in filter(self._regimes.possible, options):
+        for k in self._stopped(start.state):
+            turning = (mode.name for mode in self._machines[k].modes.options if _turns(mode))
+            options = (with_modes(start.state.regime.modes, {k: name}) for name in turning)
+            for modes in filter(self._transfer.possible, options):
                 here = self._in_modes(t, start, modes)
                 rest = self._passed(here, blow)
-                if rest is None or rest.after is here.moment:
+                if rest is None or rest.after is here.state:
                     continue
                 turned = self._turned(t, here, rest)
                 if turned is None or turned[0] != k:
                     return here, rest
         return None
 
-    def _stopped(self, moment: HybridState) -> list[int]:
+    def _stopped(self, state: HybridState) -> list[int]:
         """Gears in a mode of rest."""
-        return [k for k in self.gears if not _turns(moment.regime.mode(k))]
+        return [k for k in self.gears if not _turns(state.regime.mode(k))]
 
     def _turned(self, t: float, start: ImpactStart, rest: Blow) -> tuple[int, str] | None:
         """The gear that an impulse brings out of its mode at once, and the mode that follows."""
         if not self.gears:
             return None
-        assembly, p = rest.passing.assembly, rest.passing.p
+        equations, p = rest.passing.equations, rest.passing.p
         impulses = self._impulses(t, start, rest)
         # a gear elsewhere has the rounding of what moves there, however small the impact is
-        momentum = assembly.stores.momentum(assembly.bound(p), start.stored)
+        momentum = equations.stores.momentum(equations.bound(p), start.stored)
         least = NOTHING_OF * max(np.abs(impulses).max(initial=0.0), momentum)
         exceeded = [
-            (_guard(assembly, k, leave, impulses, p), k, leave.to)
+            (_guard(equations, k, leave, impulses, p), k, leave.to)
             for k in self.gears
-            for leave in start.moment.regime.mode(k).leaves
+            for leave in start.state.regime.mode(k).leaves
             if leave.by_torque
         ]
         exceeded = [turn for turn in exceeded if turn[0] > least]
@@ -205,11 +207,11 @@ class Impulses:
 
     def _stopping(self, t: float, start: ImpactStart, after: HybridState) -> Iterator[tuple[float, float, int, str]]:
         """Gears that would turn round: their speeds before and after, negative the way they turn, and what follows."""
-        states = (one.x[: len(one.regime.model.states)] for one in (start.moment, after))
+        states = (one.x[: len(one.regime.model.states)] for one in (start.state, after))
         least = NOTHING_OF * max(np.abs(x).max(initial=0.0) for x in states)
         for k, speed in start.speeds.items():
             speeds = speed, after.across(k, t)
-            for leave in start.moment.regime.mode(k).leaves:
+            for leave in start.state.regime.mode(k).leaves:
                 slope = float(leave.when.diff(ACROSS))
                 began, ends = (0.0 if abs(speed) <= least else slope * speed for speed in speeds)
                 if slope and ends > 0:
@@ -217,13 +219,13 @@ class Impulses:
 
     def _at_rest(self, modes: ModeNames, number: int) -> ModeNames:
         """Modes with a gear at rest, or as it then goes on where it cannot be held."""
-        leaves = self._elements[number].modes[modes[number]].leaves
+        leaves = self._machines[number].modes[modes[number]].leaves
         return self._led(modes, number, next((leave.to for leave in leaves if leave.when.has(ACROSS)), modes[number]))
 
     def _led(self, modes: ModeNames, number: int, to: str) -> ModeNames:
         """Modes with another one of a gear; where its equations contradict others, one to which it leads."""
-        names = (to, *(leave.to for leave in self._elements[number].modes[to].leaves if leave.to != modes[number]))
-        return next(filter(self._regimes.possible, (with_modes(modes, {number: name}) for name in names)), modes)
+        names = (to, *(leave.to for leave in self._machines[number].modes[to].leaves if leave.to != modes[number]))
+        return next(filter(self._transfer.possible, (with_modes(modes, {number: name}) for name in names)), modes)
 
     def _gained(self, t: float, start: ImpactStart, blow: Blow) -> dict[str, float]:
         """What all that is stored gains by the whole of an impulse."""
@@ -240,8 +242,8 @@ class Impulses:
         """
         energies, jumped = list[Mapping[str, float]](), 0.0
         for stage in stages:
-            assembly, p = stage.blow.passing.assembly, stage.blow.passing.p
-            bound, stores, gained = assembly.bound(p), assembly.stores, self._gained(t, stage.start, stage.blow)
+            equations, p = stage.blow.passing.equations, stage.blow.passing.p
+            bound, stores, gained = equations.bound(p), equations.stores, self._gained(t, stage.start, stage.blow)
             then = jumped + stage.share * (1.0 - jumped)
             late = 1.0 if before is None else (jumped + then) / 2
             for time, weight in ((t, late), (before, 1.0 - late)):
@@ -258,19 +260,19 @@ class Impulses:
         for stage in stages if self.gears else ():
             impulses = self._impulses(t, stage.start, stage.blow)
             for k, began in stage.start.speeds.items():
-                name, passing = self._elements[k].part.name, stage.blow.passing.assembly
+                name, passing = self._machines[k].part.name, stage.blow.passing.equations
                 ends = stage.blow.after.across(k, t)
-                moment, time, speed = (stage.blow.after, t, ends) if ends else (*stage.start[:2], began)
+                state, time, speed = (stage.blow.after, t, ends) if ends else (*stage.start[:2], began)
                 # the speeds of a mesh are in proportion to that of its gear
                 mean = (began + stage.share / 2 * (ends - began)) / speed if speed else 0.0
-                pairs = zip(_meshes(passing, name), _across_meshes(moment, time, name), strict=True)
+                pairs = zip(_meshes(passing, name), _across_meshes(state, time, name), strict=True)
                 energies += [{name: float(sum(stage.share * impulses[mesh] * mean * across for mesh, across in pairs))}]
         return summed(energies)
 
     def _impulses(self, t: float, start: ImpactStart, blow: Blow) -> Array:
         """(branches,) what passes through every branch at once."""
-        assembly, p = blow.passing.assembly, blow.passing.p
-        return assembly.stores.impulses(assembly.bound(p), self._gained(t, start, blow)) + blow.through
+        equations, p = blow.passing.equations, blow.passing.p
+        return equations.stores.impulses(equations.bound(p), self._gained(t, start, blow)) + blow.through
 
 
 def summed(energies: Iterable[Mapping[str, float]]) -> dict[str, float]:
@@ -286,23 +288,23 @@ def _turns(mode: Mode) -> bool:
     return any(leave.when.has(ACROSS) for leave in mode.leaves)
 
 
-def _guard(assembly: ModeEquations, number: int, leave: Leave, impulses: Array, p: Array) -> float:
+def _guard(equations: ModeEquations, number: int, leave: Leave, impulses: Array, p: Array) -> float:
     """A guard by torques where impulses (branches,) act, beside which nothing else counts."""
-    graph, total = assembly.model.form.graph, 0.0
-    for branch in assembly.parts[assembly.elements[number].part.name].branches:
+    graph, total = equations.model.form.graph, 0.0
+    for branch in equations.parts[equations.machines[number].part.name].branches:
         share = leave.when.diff(through_of(graph.branches[branch].template.label))
-        total += assembly.constant(number, share, p) * float(impulses[branch]) if share else 0.0
+        total += equations.constant(number, share, p) * float(impulses[branch]) if share else 0.0
     return total
 
 
-def _meshes(assembly: ModeEquations, name: str) -> list[int]:
+def _meshes(equations: ModeEquations, name: str) -> list[int]:
     """The branches of a part in which power is lost on its way."""
-    branches = assembly.model.form.graph.branches
-    return [branch for branch in assembly.parts[name].branches if branches[branch].template.through]
+    branches = equations.model.form.graph.branches
+    return [branch for branch in equations.parts[name].branches if branches[branch].template.through]
 
 
-def _across_meshes(moment: HybridState, t: float, name: str) -> list[float]:
+def _across_meshes(state: HybridState, t: float, name: str) -> list[float]:
     """The speeds on which the lambdas of a gear's meshes act."""
-    assembly = moment.regime.assembly
-    history = BranchHistory(assembly.bound(moment.regime.p), np.array([t]), moment.x[None, :])
-    return [float(history.acted_on(assembly.parts[name], branch)[0]) for branch in _meshes(assembly, name)]
+    equations = state.regime.equations
+    history = BranchHistory(equations.bound(state.regime.p), np.array([t]), state.x[None, :])
+    return [float(history.acted_on(equations.parts[name], branch)[0]) for branch in _meshes(equations, name)]

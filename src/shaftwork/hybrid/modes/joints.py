@@ -28,11 +28,12 @@ from scipy.sparse.linalg import splu
 from sympy import Add, Expr, Symbol
 
 from shaftwork.codegen.array_form.arrays import ArrayProgram, BoundArrays
-from shaftwork.codegen.array_form.elements import ROUNDING, Array, Factor
+from shaftwork.codegen.array_form.elements import Array, Factor
 from shaftwork.codegen.array_form.matrices import LinearPart
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.formulation.explicit_rows import Rows
 from shaftwork.formulation.form import StateForm
+from shaftwork.numerics.tolerances import SAME
 
 LARGEST_GROUP = 8
 """States that such laws may connect: each of their rows has as many terms. With 15, rows take twenty times as long to
@@ -85,8 +86,8 @@ def held_places(form: StateForm, link: int) -> set[int]:
 def groups(form: StateForm, laws: Iterable[int], others: Iterable[Collection[int]]) -> list[set[int]] | None:
     """The states that laws connect, or None where rows are not the place for what holds.
 
-    They are where no element rests because others hold both of its ends: as a rule, each holds inertias of its own. Who
-    carries would be another question, which an assembly of its own answers.
+    They are where no machine rests because others hold both of its ends: as a rule, each holds inertias of its own. Who
+    carries would be another question, which an equations of its own answers.
 
     Args:
         form: of the equations in which nothing holds.
@@ -202,7 +203,7 @@ def _followers(G: Any) -> Mapping[int, Mapping[int, float]] | None:
             for place, share in rows[column].items() if column in rows else ((column, 1.0),):
                 row[place] = row.get(place, 0.0) + gain * share
         size = max(map(abs, gains_of[first:last]), default=0.0)
-        row = {column: gain for column, gain in row.items() if abs(gain) > ROUNDING * size}
+        row = {column: gain for column, gain in row.items() if abs(gain) > SAME * size}
         if not row:
             return None
         pivot = max(row, key=lambda column: abs(row[column]))

@@ -30,7 +30,7 @@ from shaftwork.formulation.explicit_rows import Rows
 from shaftwork.formulation.form import Names
 from shaftwork.formulation.observables import NamedReadings, Observables
 from shaftwork.hybrid.modes.mode_machines import ModeGuards, ModeMachine, ModeNames
-from shaftwork.hybrid.starts import ElementReadings
+from shaftwork.hybrid.modes.starts import MachineReadings
 from shaftwork.integrate.engines import available
 from shaftwork.integrate.problem import Guards, Problem
 from shaftwork.pipeline.model import Model
@@ -60,19 +60,19 @@ class ModeEquations:
 
     Args:
         model: the compiled equations.
-        elements: of the network.
-        forms: of each element; None for one of which all are in one.
+        machines: of the network.
+        forms: of each machine; None for one of which all are in one.
         rows: of all of them, where some are in one; without these no expressions in states tell what guards read.
     """
 
     def __init__(
         self,
         model: Model,
-        elements: tuple[ModeMachine, ...],
+        machines: tuple[ModeMachine, ...],
         forms: Sequence[str | None],
         rows: Rows | None = None,
     ) -> None:
-        self.model, self.elements = model, elements
+        self.model, self.machines = model, machines
         self.whole: ModeEquations = self
         """Where what holds is numbers in the equations: those in which nothing does, of which these are a copy."""
         self.stores, self.quantities = StateTransfer(model.form), Names(model.form)
@@ -82,10 +82,10 @@ class ModeEquations:
         names = tuple(Symbol(name, real=True) for name in model.parameters)
         self._parameters = names if rows is None else rows.parameters
         self.parts = {part.name: part for part in model.form.graph.parts}
-        mode_guards = ModeGuards(model.form, elements, forms, readings)
+        mode_guards = ModeGuards(model.form, machines, forms, readings)
         self.resting, self.watched, self.sides = mode_guards.resting, mode_guards.watched, mode_guards.sides
         self._expressions, self._owners = mode_guards.expressions, mode_guards.owners
-        self._shown = ElementReadings(elements, self.parts, readings, self._parameters)
+        self._shown = MachineReadings(machines, self.parts, readings, self._parameters)
         if rows is None:
             _ = self._shown.function  # so that all quantities are known before any function of them is made
         self._prepared = BoundedCache[bytes, Prepared](KEPT)
@@ -93,10 +93,10 @@ class ModeEquations:
         self._rates_by_p = BoundedCache[bytes, tuple[RightSide, dict[str, Any]]](KEPT)
         self._guards_by_p = BoundedCache[bytes, GuardValues](KEPT)
         self._translated = BoundedCache[tuple[int, Expr], Expr](KEPT)
-        self._numbers = [self._places[element.number] for element in elements if element.number in self._places]
+        self._numbers = [self._places[machine.number] for machine in machines if machine.number in self._places]
 
     def arriving(self, x: Array) -> dict[str, float]:  # noqa: ARG002
-        """What arrives by waves, behind the states of a moment, by name; nothing where there are no waves."""
+        """What arrives by waves, behind the states, by name; nothing where there are no waves."""
         return {}
 
     def arriving_rates(self, x: list[float]) -> list[float]:  # noqa: ARG002
@@ -108,7 +108,7 @@ class ModeEquations:
         return self.stores.states(self.bound(p), t, stored)
 
     def holds_by_numbers(self, number: int) -> bool:  # noqa: ARG002
-        """Whether an element holds and gives way in these equations, by other numbers in explicit rows."""
+        """Whether a machine holds and gives way in these equations, by other numbers in explicit rows."""
         return False
 
     def taking_over(self, x: Array, p: Array) -> Array | None:  # noqa: ARG002
@@ -188,33 +188,33 @@ class ModeEquations:
         return [float(np.ravel(value)[0]) for value in self._read(p)(np.array([t]), x[None, :])]
 
     def first_modes(self, t: float, x: Array, p: Array) -> ModeNames:
-        """The mode of each element in which a motion starts, in the equations in which nothing is joined by a mode."""
+        """The mode of each machine in which a motion starts, in the equations in which nothing is joined by a mode."""
         return self._shown.first_modes(t, self._read_at(t, x, p), self.values(p))
 
     def start_of(self, number: int, besides: str, t: float, x: Array, p: Array) -> str:
-        """The mode of an element in which a motion would start, besides one; empty where it would start in none."""
+        """The mode of a machine in which a motion would start, besides one; empty where it would start in none."""
         return self._shown.start_of(number, besides, t, self._read_at(t, x, p), self.values(p))
 
     def across(self, numbers: Sequence[int], t: float, x: Array, p: Array) -> list[float]:
-        """The speeds across elements."""
+        """The speeds across machines."""
         return self._shown.across(numbers, t, self._read_at(t, x, p), self.values(p)) if numbers else []
 
     def twist(self, number: int) -> int | None:
-        """The state that is the twist of an element, or None where none is."""
-        form, owner = self.model.form, self.elements[number].part.name
+        """The state that is the twist of a machine, or None where none is."""
+        form, owner = self.model.form, self.machines[number].part.name
         angles = ((k, state.branch) for k, state in enumerate(form.states) if state.kind == "integral")
         return next((k for k, branch in angles if form.graph.part_of(branch).name == owner), None)
 
     def constant(self, number: int, expression: Expr | None, p: Array) -> float:
-        """A number that is made of an element's parameters."""
-        value = self.of_element(number, expression)
+        """A number that is made of a machine's parameters."""
+        value = self.of_machine(number, expression)
         return float(value.xreplace({s: p[self._places[s.name]] for s in value.free_symbols}))
 
-    def of_element(self, number: int, expression: Expr | None) -> Expr:
-        """What is made of an element's parameters, in those of the network; zero where there is nothing."""
-        element, of_part = self.elements[number], as_expression(expression or 0)
-        part = self.parts[element.part.name]
-        return self._translated((number, of_part), lambda: self._readings.guard(part, element.modes, of_part))
+    def of_machine(self, number: int, expression: Expr | None) -> Expr:
+        """What is made of a machine's parameters, in those of the network; zero where there is nothing."""
+        machine, of_part = self.machines[number], as_expression(expression or 0)
+        part = self.parts[machine.part.name]
+        return self._translated((number, of_part), lambda: self._readings.guard(part, machine.modes, of_part))
 
     def problem(self, modes: ModeNames, p: Array) -> Problem:
         """What is the same in all phases of these modes; the rest is empty."""
@@ -227,7 +227,7 @@ class ModeEquations:
             x0=none,
             t0=0.0,
             t_end=0.0,
-            names=(*self.model.states, *(f"limit of {self.elements[self._owners[k]].name}" for k in clocks)),
+            names=(*self.model.states, *(f"limit of {self.machines[self._owners[k]].name}" for k in clocks)),
             atol=self.prepared(p).atol,
             guards=Guards(values, self.sides(modes), none, none),
             switches=(lambda t, y: bound().switches(t, y[:, :size])) if self.model.arrays.inputs.switching else None,
@@ -253,7 +253,7 @@ class ModeEquations:
 
     def alike(self, modes: ModeNames) -> tuple[ModeEquations, ModeNames]:
         """Equations and modes that are the same for the choice of an engine: a law knows a mode by its number alone."""
-        return self, tuple(element.equivalent[name] for element, name in zip(self.elements, modes, strict=True))
+        return self, tuple(machine.equivalent[name] for machine, name in zip(self.machines, modes, strict=True))
 
     def judged(self, p: Array, problem: Problem) -> Problem:  # noqa: ARG002
         """The motion by which an engine is chosen."""
@@ -278,7 +278,7 @@ class ModeEquations:
         if error is not None or missing is None:
             return error
         active = watched[missing[1]]
-        return no_value(missing[0], in_words(self.elements[active.element].part, active.leave.when))
+        return no_value(missing[0], in_words(self.machines[active.machine].part, active.leave.when))
 
     def _rough(self, p: Array, modes: ModeNames, times: Array, states: Array) -> tuple[float, str] | None:
         """The first time at which a law or a guard has no value in some branch, and which one."""
@@ -288,7 +288,7 @@ class ModeEquations:
             quantities = np.array([*self._read(p)(times, states)]).reshape(-1, times.size)
             for time, values in zip(times, quantities.T, strict=True):
                 if is_rough(function, (time, *values, *self.values(p))):
-                    return float(time), in_words(self.elements[active.element].part, active.leave.when)
+                    return float(time), in_words(self.machines[active.machine].part, active.leave.when)
         return law
 
     def _rates(self, p: Array) -> tuple[RightSide, dict[str, Any]]:

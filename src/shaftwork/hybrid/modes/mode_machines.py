@@ -1,4 +1,4 @@
-"""What changes its mode in a network: elements, their modes, and the guards that end these.
+"""What changes its mode in a network: mode machines, their modes, and the guards that end these.
 
 What slips by its mode may not move at all, as others hold both of its ends: of two frictions on one shaft one rests.
 """
@@ -29,7 +29,7 @@ NO_IMPACT = 1e-8
 """A speed across what is joined, as part of the largest one or of one, up to which it is an error of the run."""
 
 ModeNames = tuple[str, ...]
-"""The mode of every element of a network, in their order."""
+"""The mode of every mode machine of a network, in their order."""
 
 GivesWay = tuple[tuple[float, str], ...]
 """The sides on which a torque is limited, and the modes that follow there."""
@@ -42,7 +42,7 @@ def is_same(after: Array, before: Array) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class ModeMachine:
-    """An element with its modes: a part, or a piece of one, that changes its mode.
+    """A part, or a piece of one, that changes its mode, with its modes.
 
     Args:
         part: of which it is.
@@ -112,17 +112,17 @@ class ModeMachine:
         return any(leave.rebound is not None for mode in self.modes.options for leave in mode.leaves)
 
 
-def elements_of(graph: CircuitGraph) -> tuple[ModeMachine, ...]:
-    """Every element of a network, in the order of its parts."""
+def machines_of(graph: CircuitGraph) -> tuple[ModeMachine, ...]:
+    """Every mode machine of a network, in the order of its parts."""
     return tuple(
         ModeMachine(part, modes, f"{part.name}.{modes.symbol}") for part in graph.parts for modes in part.modes
     )
 
 
-def limited(elements: Sequence[ModeMachine], modes: ModeNames) -> dict[int, GivesWay]:
+def limited(machines: Sequence[ModeMachine], modes: ModeNames) -> dict[int, GivesWay]:
     """Elements that join by a torque that is limited, with the sides on which it is and the modes there."""
-    pairs = enumerate(zip(elements, modes, strict=True))
-    sides = {k: element.modes[name].gives_way for k, (element, name) in pairs}
+    pairs = enumerate(zip(machines, modes, strict=True))
+    sides = {k: machine.modes[name].gives_way for k, (machine, name) in pairs}
     return {k: gives_way for k, gives_way in sides.items() if gives_way}
 
 
@@ -136,23 +136,23 @@ class ActiveGuard:
     """What may end a mode in a set of equations.
 
     Args:
-        element: of the mode, by its number.
+        machine: of the mode, by its number.
         guard: its place among those of the equations.
         side: on which it is met.
         leave: what follows.
     """
 
-    element: int
+    machine: int
     guard: int
     side: float
     leave: Leave
 
 
-def at_rest(netlist: Netlist, form: StateForm) -> Netlist:
+def with_laws_of_rest(netlist: Netlist, form: StateForm) -> Netlist:
     """The network with the laws of rest for what cannot move; the same one where there are none.
 
     Args:
-        netlist: of the network, with a form chosen for each element.
+        netlist: of the network, with a form chosen for each mode machine.
         form: of the same network.
     """
     parts = {part.name: part for part in form.graph.parts}
@@ -160,29 +160,29 @@ def at_rest(netlist: Netlist, form: StateForm) -> Netlist:
     for item in netlist.placed:
         part = parts[item.part.name]
         pairs = zip(part.modes, item.choices, strict=False)  # nothing is chosen for what has no modes
-        choices = tuple(_choice_at_rest(form, part, element, choice) for element, choice in pairs)
+        choices = tuple(_choice_at_rest(form, part, modes, choice) for modes, choice in pairs)
         if choices != item.choices:
             resting[part.name] = choices
     return netlist.with_choices(resting) if resting else netlist
 
 
-def _choice_at_rest(form: StateForm, part: GraphPart, element: Modes, choice: ModeChoice) -> ModeChoice:
-    """What is chosen for an element, in the form of rest where it has one and is at rest."""
-    forms = (mode.at_rest for mode in element.options if mode.form == choice.form and mode.at_rest is not None)
+def _choice_at_rest(form: StateForm, part: GraphPart, modes: Modes, choice: ModeChoice) -> ModeChoice:
+    """What is chosen for a machine, in the form of rest where it has one and is at rest."""
+    forms = (mode.at_rest for mode in modes.options if mode.form == choice.form and mode.at_rest is not None)
     other = next(forms, None)
-    return replace(choice, form=other) if other is not None and rests(form, part, element) else choice
+    return replace(choice, form=other) if other is not None and rests(form, part, modes) else choice
 
 
-def rests(form: StateForm, part: GraphPart, element: Modes) -> bool:
-    """Whether no branch of the tree but rigid joints is on the way from one end of an element to the other."""
-    return joints_across(form, part, element) is not None
+def rests(form: StateForm, part: GraphPart, modes: Modes) -> bool:
+    """Whether no branch of the tree but rigid joints is on the way from one end of a machine to the other."""
+    return joints_across(form, part, modes) is not None
 
 
-def joints_across(form: StateForm, part: GraphPart, element: Modes) -> Mapping[int, float] | None:
-    """The rigid joints on the way from one end of an element to the other, by branch, with the speed across the element
+def joints_across(form: StateForm, part: GraphPart, modes: Modes) -> Mapping[int, float] | None:
+    """The rigid joints on the way from one end of a machine to the other, by branch, with the speed across the machine
     for one across each of them; None where other branches of the tree are on it.
     """
-    first, second = (_potential(form, part, end) for end in part.ends_of(element))
+    first, second = (_potential(form, part, end) for end in part.ends_of(modes))
     if first is None or second is None:
         return None
     path = {tree: add(first.get(tree, 0), -second.get(tree, 0), []) for tree in dict.fromkeys(chain(first, second))}
@@ -191,17 +191,17 @@ def joints_across(form: StateForm, part: GraphPart, element: Modes) -> Mapping[i
     return joints if rigid else None
 
 
-def holds_at_rest(form: StateForm, part: GraphPart, element: Modes) -> tuple[int, float] | None:
-    """The branch of the friction that alone holds an element at rest, and the sign of its speed for the element's.
+def holds_at_rest(form: StateForm, part: GraphPart, modes: Modes) -> tuple[int, float] | None:
+    """The branch of the friction that alone holds a machine at rest, and the sign of its speed for the machine's.
 
     None where nothing does, or another part that has modes, or several.
     """
-    joints = joints_across(form, part, element) or {}
+    joints = joints_across(form, part, modes) or {}
     holders = {branch: share for branch, share in joints.items() if form.graph.part_of(branch).modes}
     if len(holders) != 1:
         return None
     ((branch, share),) = holders.items()
-    rubs = any(len(mode.gives_way) > 1 for modes in form.graph.part_of(branch).modes for mode in modes.options)
+    rubs = any(len(mode.gives_way) > 1 for other in form.graph.part_of(branch).modes for mode in other.options)
     return (branch, math.copysign(1.0, share)) if rubs else None
 
 
@@ -215,55 +215,55 @@ class ModeGuards:
 
     Args:
         form: of the equations.
-        elements: of the network.
-        forms: of each element; None for one of which all are in these equations.
+        machines: of the network.
+        forms: of each machine; None for one of which all are in these equations.
         readings: of the same.
     """
 
     def __init__(
-        self, form: StateForm, elements: Sequence[ModeMachine], forms: Sequence[str | None], readings: Observables
+        self, form: StateForm, machines: Sequence[ModeMachine], forms: Sequence[str | None], readings: Observables
     ) -> None:
-        self._form, self._elements, self._readings = form, elements, readings
+        self._form, self._machines, self._readings = form, machines, readings
         self._parts = {part.name: part for part in form.graph.parts}
         self.expressions: list[Expr] = []
         """Each guard once."""
-        self.resting = {k for k, e in enumerate(elements) if rests(form, self._parts[e.part.name], e.modes)}
+        self.resting = {k for k, e in enumerate(machines) if rests(form, self._parts[e.part.name], e.modes)}
         """Elements of which others hold both ends."""
         self._places: dict[tuple[int, Expr], int] = {}
         self._leaves: dict[tuple[int, str], tuple[ActiveGuard, ...]] = {}
-        for number, element in enumerate(elements):
-            part = self._parts[element.part.name]
-            for mode in element.modes.options:
+        for number, machine in enumerate(machines):
+            part = self._parts[machine.part.name]
+            for mode in machine.modes.options:
                 if forms[number] in (None, mode.form):
-                    holds = forms[number] is None and element.joins(mode.name)
+                    holds = forms[number] is None and machine.joins(mode.name)
                     still = {ACROSS: Integer(0)} if holds or number in self.resting else {}
                     self._leaves[number, mode.name] = tuple(self._leaving(number, part, mode, still))
-        self.owners = {active.guard: active.element for guards in self._leaves.values() for active in guards}
-        """The element of each guard."""
+        self.owners = {active.guard: active.machine for guards in self._leaves.values() for active in guards}
+        """The machine of each guard."""
         self._sides: dict[ModeNames, Array] = {}
         self._ends: dict[ModeNames, tuple[ActiveGuard, ...]] = {}
 
     def _leaving(self, number: int, part: GraphPart, mode: Mode, still: Mapping[Symbol, Expr]) -> Iterator[ActiveGuard]:
-        """The guards of a mode; what another mode of the element has is shared, with the other sign as well.
+        """The guards of a mode; what another mode of the machine has is shared, with the other sign as well.
 
         Args:
-            number: of the element.
-            part: of the element.
-            mode: of the element.
+            number: of the machine.
+            part: of the machine.
+            mode: of the machine.
             still: its speed where that is always zero: through gears it would be so but for rounding, which would tell
                 which way a friction slips.
         """
         taken: list[int] = []
-        element = self._elements[number].modes
+        modes = self._machines[number].modes
         for leave in mode.leaves:
             try:
-                when = self._readings.guard(part, element, leave.when.xreplace(still))
+                when = self._readings.guard(part, modes, leave.when.xreplace(still))
                 if still and leave.by_speed:
                     # what has given way at rest holds again before the one that holds it is pressed the other way
-                    when = leave.when.xreplace({ACROSS: self._holding(part, element)})
+                    when = leave.when.xreplace({ACROSS: self._holding(part, modes)})
             except ValueError as error:  # sympy's, of a minimum or maximum of what is infinite
                 raise CompileError(
-                    f"A law of '{self._elements[number].name}' has no finite value at zero speed, where it is "
+                    f"A law of '{self._machines[number].name}' has no finite value at zero speed, where it is "
                     f"{mode.words}. Take one that has, as 1 / (0.1 + omega**2) has for 1 / omega**2."
                 ) from error
             for side, expression in ((1.0, when), (-1.0, -when)):
@@ -278,9 +278,9 @@ class ModeGuards:
             taken.append(active.guard)
             yield active
 
-    def _holding(self, part: GraphPart, element: Modes) -> Expr:
-        """The torque of the one friction that holds an element at rest, with the sign that its own would have."""
-        holder = holds_at_rest(self._form, part, element)
+    def _holding(self, part: GraphPart, modes: Modes) -> Expr:
+        """The torque of the one friction that holds a machine at rest, with the sign that its own would have."""
+        holder = holds_at_rest(self._form, part, modes)
         if holder is None:
             return Integer(0)
         branch, sign = holder

@@ -34,7 +34,7 @@ from shaftwork.network.kinds import Kind
 from shaftwork.pipeline.model import Model
 
 MANY = 12
-"""From so many elements on that hold and slip matrices are quicker than equations for each combination that is met."""
+"""From so many machines on that hold and slip matrices are quicker than equations for each combination that is met."""
 KEPT_RATES = 2
 """Parameter vectors whose right-hand sides are kept in one combination of what holds."""
 
@@ -44,18 +44,18 @@ class ReactionEquations(ModeEquations):
 
     Args:
         model: the equations in which everything slips.
-        elements: of the network.
-        laws: of each element the branch of its law; None for one that is in the form that it has here.
+        machines: of the network.
+        laws: of each machine the branch of its law; None for one that is in the form that it has here.
     """
 
-    def __init__(self, model: Model, elements: tuple[ModeMachine, ...], laws: Sequence[int | None]) -> None:
-        self._entries = _entries(model, elements, laws)
+    def __init__(self, model: Model, machines: tuple[ModeMachine, ...], laws: Sequence[int | None]) -> None:
+        self._entries = _entries(model, machines, laws)
         choices = chain.from_iterable(item.choices for item in model.netlist.placed)
         forms = [choice.form if law is None else None for law, choice in zip(laws, choices, strict=True)]
-        super().__init__(model, elements, forms, None if self._entries is None else self._entries.rows)
+        super().__init__(model, machines, forms, None if self._entries is None else self._entries.rows)
         self.stores = HeldStores(model.form)
-        self._laws, self._held = laws, list[int]()
-        joining = (element.number for element, law in zip(elements, laws, strict=True) if law is not None)
+        self._laws, self._holding_laws = laws, list[int]()
+        joining = (machine.number for machine, law in zip(machines, laws, strict=True) if law is not None)
         self._joining = [self._places[number] for number in joining if number in self._places]
         self._joints: tuple[LinearPart, Joints] | None = None
         self._notes: dict[bytes, dict[str, Any]] = {}
@@ -63,15 +63,15 @@ class ReactionEquations(ModeEquations):
         _ = self._many, self.clocks  # made once for all
 
     def holding(self, numbers: tuple[int, ...]) -> ReactionEquations:
-        """The equations in which the elements of these numbers hold."""
+        """The equations in which the machines of these numbers hold."""
         other = copy(self)
         caches: dict[str, Any] = {name: BoundedCache(KEPT_RATES) for name in ("_guards_by_p", "_rates_by_p")}
         laws = [law for k in numbers if (law := self._laws[k]) is not None]
-        vars(other).update(_held=laws, _joints=None, _holds=None, **caches)
+        vars(other).update(_holding_laws=laws, _joints=None, _holds=None, **caches)
         return other
 
     def holds_by_numbers(self, number: int) -> bool:
-        """Whether an element holds and gives way by other numbers in explicit rows."""
+        """Whether a machine holds and gives way by other numbers in explicit rows."""
         return self._entries is not None and self._laws[number] is not None
 
     def taking_over(self, x: Array, p: Array) -> Array | None:
@@ -108,11 +108,11 @@ class ReactionEquations(ModeEquations):
         """What holds, for parameters; the last is kept."""
         part = self.prepared(p).bound.part
         if self._joints is None or self._joints[0] is not part:
-            self._joints = part, Joints(self.model.form, part, self._held)
+            self._joints = part, Joints(self.model.form, part, self._holding_laws)
         return self._joints[1]
 
     def alike(self, modes: ModeNames) -> tuple[ModeEquations, ModeNames]:
-        """What is the same for the choice of an engine: whether an element holds or slips does not make it stiff."""
+        """What is the same for the choice of an engine: whether a machine holds or slips does not make it stiff."""
         return self.whole, tuple("" if law is not None else name for law, name in zip(self._laws, modes, strict=True))
 
     def judged(self, p: Array, problem: Problem) -> Problem:
@@ -137,12 +137,12 @@ class ReactionEquations(ModeEquations):
         return self._rates_by_p(p.tobytes(), lambda: (self._right_side(p), notes))
 
 
-def laws_that_hold(model: Model, elements: Sequence[ModeMachine]) -> list[int | None] | None:
-    """Of each element that holds the branch of the law in whose place a reaction does so; None for others.
+def laws_that_hold(model: Model, machines: Sequence[ModeMachine]) -> list[int | None] | None:
+    """Of each machine that holds the branch of the law in whose place a reaction does so; None for others.
 
     Args:
         model: equations in which none of them joins anything.
-        elements: of the network.
+        machines: of the network.
 
     Returns:
         None where reactions would not tell the motion: where a speed is prescribed, where what holds has no inertia at
@@ -151,19 +151,19 @@ def laws_that_hold(model: Model, elements: Sequence[ModeMachine]) -> list[int | 
     form = model.form
     if form.loop_laws or form.inertial or form.across_inputs or form.waves or form.dependent_through:
         return None
-    laws = [_law(form, element) if element.holds else None for element in elements]
-    lacking = (element.holds and law is None for law, element in zip(laws, elements, strict=True))
+    laws = [_law(form, machine) if machine.holds else None for machine in machines]
+    lacking = (machine.holds and law is None for law, machine in zip(laws, machines, strict=True))
     return None if any(lacking) else laws
 
 
-def _entries(model: Model, elements: Sequence[ModeMachine], laws: Sequence[int | None]) -> HeldRows | None:
+def _entries(model: Model, machines: Sequence[ModeMachine], laws: Sequence[int | None]) -> HeldRows | None:
     """Rows in which what holds is numbers, or None where there are none."""
-    pairs = [(element, law) for element, law in zip(elements, laws, strict=True) if law is not None]
+    pairs = [(machine, law) for machine, law in zip(machines, laws, strict=True) if law is not None]
     links = [law for _, law in pairs]
     if not all(_vanishes(model.form, *pair) for pair in pairs):
         return None
-    rigid = (element for element, law in zip(elements, laws, strict=True) if law is None and element.joined)
-    others = [_places(model.form, element) for element in rigid]
+    rigid = (machine for machine, law in zip(machines, laws, strict=True) if law is None and machine.joined)
+    others = [_places(model.form, machine) for machine in rigid]
     joined = groups(model.form, links, others)
     rows = None if joined is None else model.rows_of(len(others) + 1)
     if joined is None or rows is None:
@@ -171,30 +171,30 @@ def _entries(model: Model, elements: Sequence[ModeMachine], laws: Sequence[int |
     return HeldRows(rows, [(link, held_places(model.form, link)) for link in links], joined)
 
 
-def _vanishes(form: StateForm, element: ModeMachine, law: int) -> bool:
-    """Whether a law is zero in all modes in which an element holds."""
+def _vanishes(form: StateForm, machine: ModeMachine, law: int) -> bool:
+    """Whether a law is zero in all modes in which a machine holds."""
     template = form.graph.branches[law].template
-    numbers = [symbol for symbol in template.symbols if symbol.name == element.modes.symbol]
-    values = (Float(element.modes[mode].value) for mode in element.joined)
+    numbers = [symbol for symbol in template.symbols if symbol.name == machine.modes.symbol]
+    values = (Float(machine.modes[mode].value) for mode in machine.joined)
     return all(template.law.xreplace(dict.fromkeys(numbers, value)) == 0 for value in values)
 
 
-def _places(form: StateForm, element: ModeMachine) -> set[int]:
-    """Places of the states of speed that the nodes of an element's part turn with."""
-    part = next(part for part in form.graph.parts if part.name == element.part.name)
+def _places(form: StateForm, machine: ModeMachine) -> set[int]:
+    """Places of the states of speed that the nodes of a machine's part turn with."""
+    part = next(part for part in form.graph.parts if part.name == machine.part.name)
     rows = (form.tree.potentials[node] or {} for node in part.nodes.values() if node != GROUND)
     trees = set[int]().union(*rows)
     return {place for place, tree in enumerate(form.across_states) if tree in trees}
 
 
-def _law(form: StateForm, element: ModeMachine) -> int | None:
-    """The link whose law has the mode of an element, between its ends, where inertias tell the speeds of both."""
-    graph, part = form.graph, next(part for part in form.graph.parts if part.name == element.part.name)
-    ends = tuple(map(part.node_at, part.ends_of(element.modes)))
+def _law(form: StateForm, machine: ModeMachine) -> int | None:
+    """The link whose law has the mode of a machine, between its ends, where inertias tell the speeds of both."""
+    graph, part = form.graph, next(part for part in form.graph.parts if part.name == machine.part.name)
+    ends = tuple(map(part.node_at, part.ends_of(machine.modes)))
     for index in part.branches:
         branch = graph.branches[index]
         symbols = {symbol.name for symbol in branch.template.law.free_symbols}
-        if branch.template.kind not in (Kind.LAW, Kind.THROUGH_SOURCE) or element.modes.symbol not in symbols:
+        if branch.template.kind not in (Kind.LAW, Kind.THROUGH_SOURCE) or machine.modes.symbol not in symbols:
             continue
         by_inertias = index in form.tree.loops and set(form.tree.loops[index]) <= {*form.across_states}
         if by_inertias and (branch.plus, branch.minus) == ends:

@@ -7,7 +7,6 @@ motion that is resolved it loses far less energy than the tolerance. An undamped
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -20,46 +19,14 @@ from shaftwork.integrate.collocation.banded_stages import (
     StepStart,
     shifted_collocation,
 )
-from shaftwork.integrate.crossings import Crossings
 from shaftwork.integrate.engines import ENGINES
 from shaftwork.integrate.problem import Array, Problem, Trajectory
-from shaftwork.integrate.smooth_intervals import (
-    Pace,
-    SmoothInterval,
-    both_sides,
-    check_finite,
-    failure,
-    pieces,
-    start_of_piece,
-    used_up,
-)
+from shaftwork.integrate.smooth_intervals import SmoothInterval, check_finite, failure, pieces
+from shaftwork.integrate.stepping import Step, SteppedRun, march
 from shaftwork.numerics.tolerances import SAME
 
-STAGES = 6
-# A step grows at least by the first factor, because its factors are made anew, and at most by the second.
-WORTH, GROW = 1.5, 8.0
-SAFETY, SHRINK, NEWTON_SHRINK = 0.9, 0.1, 0.25
-# A chain of damped springs has four entries a state at most; matrices of more may fill up.
-FEW_ENTRIES = 8
-
-
-@dataclass(frozen=True)
-class _BandedStep:
-    """What makes a step again.
-
-    Args:
-        piece: number of its piece.
-        t: its start, s.
-        length: s.
-        x: (n,) state at the start.
-        rate: (n,) its derivative, or None where it follows from the state without noise.
-    """
-
-    piece: int
-    t: float
-    length: float
-    x: Array
-    rate: Array | None
+# A step is chosen so much shorter than the error of the last one would let it be.
+SAFETY = 0.9
 
 
 def solve(problem: Problem) -> Trajectory:
@@ -76,19 +43,15 @@ def solve(problem: Problem) -> Trajectory:
 
     Source: Hairer and Wanner, Solving Ordinary Differential Equations II, 1996, chapter IV.
     """
-    run = _BandedMarch(problem)
+    stepper = _BandedStepper(problem)
     with np.errstate(all="ignore"):
-        for number, piece in enumerate(run.pieces):
-            run.march(number, piece)
-    statistics = {"steps": len(run.steps), "rejected": run.rejected, **run.stages.counts}
-    if problem.t_eval is not None:
-        return Trajectory(np.asarray(problem.t_eval, dtype=float), run.outputs.x, _BandedDense(run), statistics)
-    times, states = [], []
-    for number, piece in enumerate(run.pieces):
-        steps = [step for step in run.steps if step.piece == number]
-        times.append(np.array([*(step.t for step in steps), piece.end]))
-        states.append(np.array([*(step.x for step in steps), run.ends[number]]))
-    return Trajectory(*both_sides(problem, times, states), _BandedDense(run), statistics)
+        whole = march(problem, stepper)
+    taken = sum(len(piece.times) - 1 for piece in whole.pieces)
+    statistics = {"steps": taken, "rejected": stepper.tried - taken, **stepper.stages.counts}
+    dense = _BandedDense(whole, stepper)
+    if problem.t_eval is None:
+        return Trajectory(*whole.both_sides(problem), dense, statistics)
+    return Trajectory(np.asarray(problem.t_eval, dtype=float), stepper.outputs.x, dense, statistics)
 
 
 def is_chain(problem: Problem) -> bool:
@@ -96,7 +59,8 @@ def is_chain(problem: Problem) -> bool:
     if problem.straight is None and problem.jacobian is None:
         return False
     matrix = _matrix(problem)
-    return bool(matrix.nnz <= FEW_ENTRIES * matrix.shape[0])
+    # damped springs in a chain give four entries a state at most; matrices of more than eight may fill up
+    return bool(matrix.nnz <= 8 * matrix.shape[0])
 
 
 def is_undamped(problem: Problem) -> bool:
@@ -112,16 +76,18 @@ def is_undamped(problem: Problem) -> bool:
 class _Arc:
     """The polynomial of one step."""
 
-    def __init__(self, run: _BandedMarch, start: StepStart, length: float, modes: Array) -> None:
-        method = self._method = run.method
-        self._stages, self._start, self._length, self._modes = run.stages, start, length, modes
+    def __init__(
+        self, stages: BandedStages, method: ShiftedCollocation, start: StepStart, length: float, modes: Array
+    ) -> None:
+        self._stages, self._method = stages, method
+        self.start, self.length, self._modes = start, length, modes
         # The slope that the system has at the start, where the polynomial need not meet it, less the polynomial's own.
         self.defect = length * start.rate - method.at_start @ modes
 
     @cached_property
     def end(self) -> Array:
         """State (n,) at the end of the step."""
-        return np.asarray(self._start.x + self._method.at_end[0] @ self._modes)
+        return np.asarray(self.start.x + self._method.at_end[0] @ self._modes)
 
     @cached_property
     def _correction(self) -> Array:
@@ -131,19 +97,19 @@ class _Arc:
         error, and the bump of the defect would spread it over the step: at a damping ratio of 1e6 the torque would be
         off by 2e-5 of its largest value, where it is by 5e-10.
         """
-        return self._stages.quieted(self.defect, self._length, self._start.scale)
+        return self._stages.quieted(self.defect, self.length, self.start.scale)
 
     @property
     def rate(self) -> Array:
         """Slope (n,) at the end of the step."""
-        return np.asarray(self._method.at_end[1] @ self._modes) / self._length
+        return np.asarray(self._method.at_end[1] @ self._modes) / self.length
 
     def at(self, times: Array) -> Array:
         """States (k, n) at times (k,) of the step, before the next one is tried."""
-        theta = (times - self._start.t) / self._length
+        theta = (times - self.start.t) / self.length
         states = self._method.increments(theta) @ self._modes
         states += np.multiply.outer(self._method.bump(theta), self._correction)
-        states += self._start.x
+        states += self.start.x
         return np.asarray(states)
 
 
@@ -167,52 +133,68 @@ class _Outputs:
             self.x[first:last] = arc.at(self._times[first:last])
 
 
-class _BandedMarch:
-    """The march over the pieces, and what dense output needs of it."""
+class _BandedStepper:
+    """The method, and what dense output needs of its steps."""
+
+    engine = "banded"
+    cuts_off = False
 
     def __init__(self, problem: Problem) -> None:
-        self.problem, self.pieces = problem, pieces(problem)
+        self.problem, self._rtol = problem, max(problem.rtol, ENGINES["banded"].finest)
         self.method = _method(problem)
         self.stages = BandedStages(problem, _matrix(problem), self.method)
         self.outputs = _Outputs(problem)
-        self.steps: list[_BandedStep] = []
-        self.ends: list[Array] = []
-        self.rejected = 0
-        self._rtol, self._pace = max(problem.rtol, ENGINES["banded"].finest), Pace(problem)
+        self.pieces: list[SmoothInterval] = []
+        self.taken: list[list[tuple[float, Array | None]]] = []
+        """Of each piece, the lengths in s of its steps and the slopes (n,) at their starts, None where these follow
+        without noise."""
+        self.tried = 0
+        self._arc: _Arc | None = None
 
     def scale(self, x: Array) -> Array:
         """The tolerance (n,) of each state."""
         return np.maximum(self.problem.atol + self._rtol * np.abs(x), np.finfo(float).tiny)
 
-    def march(self, number: int, piece: SmoothInterval) -> None:
-        """Step through one piece."""
-        before = self.ends[-1] if self.ends else np.asarray(self.problem.x0, dtype=float)
-        start, step = self._open(piece, piece.start, start_of_piece(self.problem, piece, before))
-        crossings = Crossings(self.problem, piece)
-        while start.t < piece.end:
-            self._check(start, step)
-            length, end = _fitted(start.t, step, piece.end)
-            arc = self.arc(start, length)
-            scale = start.scale if arc is None else self.scale(arc.end)
-            factor = NEWTON_SHRINK if arc is None else self._factor(arc, np.maximum(start.scale, scale))
-            if arc is None or factor < SAFETY:
-                step, self.rejected = factor * length, self.rejected + 1
-                continue
-            cut = crossings.cut(start.t, start.x, end, arc.end, arc.at)
-            if cut is not None and cut < end:
-                step, self.rejected = cut - start.t, self.rejected + 1
-                continue
-            if factor > WORTH:
-                step = max(step, factor * length)
-            self.steps.append(_BandedStep(number, start.t, length, start.x, start.rate if self.stages.noisy else None))
-            self.outputs.fill(start.t, end, arc)
-            self._finish(end, arc.end, rests=crossings.rests)
-            if cut is not None and end < piece.end:
-                start, step = self._open(piece, end, arc.end)
-                continue
-            rate = arc.rate if self.stages.noisy or end == piece.end else self.stages.rate(end, arc.end)
-            start = StepStart(end, arc.end, rate, scale)
-        self.ends.append(start.x)
+    def open(self, piece: SmoothInterval, t: float, x: Array) -> Array:
+        if t == piece.start:
+            self.pieces.append(piece)
+            self.taken.append([])
+        self.outputs.start(t, x)
+        self.stages.open(piece)
+        self._start = start = StepStart(t, x, self.stages.rate(t, x), self.scale(x))
+        # At first no state moves by more than its tolerance, over the peak: that step stands, and soon grows.
+        speed = self.method.peak * float((np.abs(start.rate) / start.scale).max())
+        self._step = 1 / speed if speed > 0 else piece.end - t
+        return x
+
+    def step(self, t: float, x: Array) -> Step | None:
+        self.tried, piece = self.tried + 1, self.pieces[-1]
+        if self._arc is not None and self._start.t != t:
+            rate = self._arc.rate if self.stages.noisy else self.stages.rate(t, x)
+            self._start = StepStart(t, x, rate, self.scale(x))
+        start = self._start
+        if not self._step > 8 * np.spacing(abs(t)):
+            reason = self.stages.reason("the step became too small")
+            raise failure(self.problem, "banded", t, x, reason)
+        length, end = _fitted(t, self._step, piece.end)
+        arc = self.arc(start, length)
+        factor = 0.25 if arc is None else self._factor(arc, np.maximum(start.scale, self.scale(arc.end)))
+        if arc is None or factor < SAFETY:
+            self._step = factor * length
+            return None
+        check_finite(self.problem, "banded", end, arc.end)
+        # a longer step has to be worth the factors that are made anew for it
+        self._arc, self._longer = arc, factor * length if factor > 1.5 else 0.0
+        return Step(end, arc.end, arc.at)
+
+    def again(self, t: float, x: Array, end: float, longest: float) -> None:  # noqa: ARG002 (it starts as it did)
+        self._step = min(end - t, longest)
+
+    def take(self, t: float, end: float, state: Array) -> None:  # noqa: ARG002 (the step has it)
+        assert self._arc is not None  # noqa: S101 (a step is taken once it is made)
+        self._step = max(self._step, self._longer)
+        self.taken[-1].append((self._arc.length, self._start.rate if self.stages.noisy else None))
+        self.outputs.fill(t, end, self._arc)
 
     def arc(self, start: StepStart, length: float, expected: Array | None = None) -> _Arc | None:
         """A step, or None where its equations have no solution that is found.
@@ -226,82 +208,55 @@ class _BandedMarch:
             modes = self.stages.modes(start, length, expected)
         except np.linalg.LinAlgError:
             return None
-        return None if modes is None else _Arc(self, start, length, modes)
-
-    def _open(self, piece: SmoothInterval, t: float, x: Array) -> tuple[StepStart, float]:
-        """Start anew: from where, and the length of the first step in s."""
-        self.outputs.start(t, x)
-        self.stages.open(piece)
-        start = StepStart(t, x, self.stages.rate(t, x), self.scale(x))
-        # At first no state moves by more than its tolerance, over the peak: that step stands, and soon grows.
-        speed = self.method.peak * float((np.abs(start.rate) / start.scale).max())
-        return start, 1 / speed if speed > 0 else piece.end - t
+        return None if modes is None else _Arc(self.stages, self.method, start, length, modes)
 
     def _factor(self, arc: _Arc, scale: Array) -> float:
         """The factor by which the next step may be longer; below `SAFETY` this one was too long."""
-        error = self.method.peak * float((np.abs(arc.defect) / scale).max())
+        error, least, most = self.method.peak * float((np.abs(arc.defect) / scale).max()), 0.1, 8.0
         if not np.isfinite(error):
-            return SHRINK
-        return float(np.clip(SAFETY * max(error, 1e-300) ** (-1 / (self.method.order + 1)), SHRINK, GROW))
-
-    def _check(self, start: StepStart, step: float) -> None:
-        """Raise where a run cannot go on."""
-        if len(self.steps) + self.rejected >= self.problem.max_steps:
-            raise failure(self.problem, "banded", start.t, start.x, used_up(self.problem))
-        if not step > 8 * np.spacing(abs(start.t)):
-            reason = self.stages.reason("the step became too small")
-            raise failure(self.problem, "banded", start.t, start.x, reason)
-
-    def _finish(self, t: float, x: Array, *, rests: bool) -> None:
-        check_finite(self.problem, "banded", t, x)
-        if (objection := self._pace.objection(t, rests=rests)) is not None:
-            raise failure(self.problem, "banded", t, x, objection)
+            return least
+        return float(np.clip(SAFETY * max(error, 1e-300) ** (-1 / (self.method.order + 1)), least, most))
 
 
 class _BandedDense:
     """The motion at any time, from steps that are made again: their polynomials would fill the memory."""
 
-    def __init__(self, run: _BandedMarch) -> None:
-        self._run = run
-        self._starts = np.array([step.t for step in run.steps])
-
-    @property
-    def steps(self) -> Array:
-        return np.array([*self._starts, self._run.problem.t_end])
+    def __init__(self, whole: SteppedRun, stepper: _BandedStepper) -> None:
+        self._pieces, self._stepper, self.steps = whole.pieces, stepper, whole.steps
+        self._places = [(k, step) for k, piece in enumerate(whole.pieces) for step in range(len(piece.times) - 1)]
 
     def __call__(self, times: Array) -> Array:
         times = np.atleast_1d(np.asarray(times, dtype=float))
-        run, opened = self._run, -1
-        index = np.clip(np.searchsorted(self._starts, times, side="right") - 1, 0, self._starts.size - 1)
-        states = run.steps[0].x[None, :].repeat(times.size, axis=0)
+        stages, opened = self._stepper.stages, -1
+        index = np.clip(np.searchsorted(self.steps, times, side="right") - 1, 0, len(self._places) - 1)
+        states = np.empty((times.size, self._pieces[0].states[0].size))
         with np.errstate(all="ignore"):
             for number in np.unique(index):
-                step, chosen = run.steps[number], index == number
-                if step.piece != opened:
-                    opened = step.piece
-                    run.stages.open(run.pieces[opened])
-                states[chosen] = step.x if (times[chosen] == step.t).all() else self._arc(number).at(times[chosen])
+                (piece, step), chosen = self._places[number], index == number
+                if piece != opened:
+                    opened = piece
+                    stages.open(self._stepper.pieces[piece])
+                start, x = self._pieces[piece].times[step], self._pieces[piece].states[step]
+                states[chosen] = x if (times[chosen] == start).all() else self._arc(piece, step).at(times[chosen])
         return states
 
-    def _arc(self, number: int) -> _Arc:
-        run, step = self._run, self._run.steps[number]
-        follows = number + 1 < len(run.steps) and run.steps[number + 1].piece == step.piece
-        end = run.steps[number + 1].x if follows else run.ends[step.piece]
-        rate = run.stages.rate(step.t, step.x) if step.rate is None else step.rate
-        start = StepStart(step.t, step.x, rate, run.scale(step.x))
-        theta = run.method.nodes[:, None]
+    def _arc(self, number: int, step: int) -> _Arc:
+        stepper, piece, (length, rate) = self._stepper, self._pieces[number], self._stepper.taken[number][step]
+        t, (x, state) = piece.times[step], piece.states[step : step + 2]
+        start = StepStart(t, x, stepper.stages.rate(t, x) if rate is None else rate, stepper.scale(x))
+        theta = stepper.method.nodes[:, None]
         # A parabola through what is known of the step leads Newton's method to the same solution.
-        expected = theta * step.length * rate + theta**2 * (end - step.x - step.length * rate)
-        arc = run.arc(start, step.length, expected)
+        expected = theta * length * start.rate + theta**2 * (state - x - length * start.rate)
+        arc = stepper.arc(start, length, expected)
         if arc is None:
-            raise failure(run.problem, "banded", step.t, step.x, "a step could not be repeated for dense output")
+            raise failure(stepper.problem, "banded", t, x, "a step could not be repeated for dense output")
         return arc
 
 
 def _method(problem: Problem) -> ShiftedCollocation:
     """The method that suits a problem."""
     undamped = problem.straight is not None and is_undamped(problem)
-    return shifted_collocation("gauss" if undamped else "radau", STAGES)
+    return shifted_collocation("gauss" if undamped else "radau", 6)
 
 
 def _matrix(problem: Problem) -> Any:

@@ -22,16 +22,6 @@ Complex = NDArray[np.complex128]
 Family = Literal["radau", "gauss"]
 Solver = Callable[[Complex], Complex]
 
-MOST_ITERATIONS = 10
-# Newton's method ends at this part of the tolerance: the error estimate, a difference of slopes, amplifies the rest.
-NEWTON_SHARE = 1e-3
-# Above this contraction a new Jacobian costs less than the iterations that it saves.
-SLOW = 0.05
-# A polynomial is not continued further than this part of its step.
-REACH = 3.0
-# Elimination joins the neighbours of a state to each other; a hub of many arms is left in.
-MOST_NEIGHBOURS = 4
-
 
 @dataclass(frozen=True, eq=False)
 class ShiftedCollocation:
@@ -202,7 +192,8 @@ def _integrators(matrix: Any) -> Any:
     pattern = sparse.csr_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
     both = sparse.csr_array(pattern + pattern.T)
     neighbours = np.diff(both.indptr)
-    candidates = np.flatnonzero((both.diagonal() == 0) & (neighbours > 0) & (neighbours <= MOST_NEIGHBOURS))
+    few = (neighbours > 0) & (neighbours <= 4)  # elimination joins all of them: a hub of many arms is left in
+    candidates = np.flatnonzero((both.diagonal() == 0) & few)
     starts, indices = both.indptr.tolist(), both.indices.tolist()
     chosen = [False] * both.shape[0]
     for state in candidates[np.argsort(neighbours[candidates], kind="stable")].tolist():
@@ -339,7 +330,7 @@ class BandedStages:
     def _extrapolated(self, start: StepStart, step: float) -> Array:
         """Stage increments (s, n) by the polynomial of the step before, or of a longer one from the same start."""
         t, length, modes = self._last or (start.t, 0.0, start.x)
-        if step > REACH * length:
+        if step > 3 * length:  # so far a polynomial is continued beyond its step, and no further
             return np.zeros((self._method.order, start.x.size))
         begin = (start.t - t) / length
         weights = self._method.increments(begin + step / length * self._method.nodes) - self._method.increments(begin)
@@ -349,7 +340,7 @@ class BandedStages:
         modes = self._method.to_modes @ increments
         # What is known of the contraction from the step before, trusted less and less.
         before, contraction = math.inf, self._contraction**0.8
-        for iteration in range(MOST_ITERATIONS):
+        for iteration in range(10):
             rates = self._rates(start, step, self._at_nodes @ modes)
             if not np.isfinite(rates.sum()):
                 return None
@@ -362,9 +353,11 @@ class BandedStages:
                 contraction = size / before
             # A first change beyond the tolerance may have led across a kink, which only the next iteration shows.
             sure = contraction < 1.0 and (iteration > 0 or size < 1.0)
-            if size == 0.0 or (sure and contraction / (1 - contraction) * size < NEWTON_SHARE):
+            # What is left is below 1e-3 of the tolerance: the error estimate, a difference of slopes, amplifies it.
+            if size == 0.0 or (sure and contraction / (1 - contraction) * size < 1e-3):
                 self._contraction = max(contraction, float(np.finfo(float).eps))
-                self._wanted = iteration > 0 and contraction > SLOW
+                # Above this contraction a new Jacobian costs less than the iterations that it saves.
+                self._wanted = iteration > 0 and contraction > 0.05
                 return modes
             before = size
         return None

@@ -28,27 +28,15 @@ from shaftwork.numerics.tolerances import SAME
 
 Complex = NDArray[np.complex128]
 
-# The modes may multiply rounding errors by this much; a defective matrix is far beyond.
-LARGEST_CONDITION = 1e4
-# Up to this size of their argument the phi functions are summed as series of so many terms.
-NEAR, SERIES_TERMS = 2.0, 24
 # Degree of a panel's polynomials, the part of an input that they may leave out, and that which rounding may take.
 DEGREE, LEFT_OUT, ROUNDED = 8, 1e-13, 1e-10
-# Panels of a run at least: where an input is nothing but for short blows, fewer nodes may all lie between these.
-FEWEST = 512
-# Inputs of more values in a run, states by nodes, are left to engines that step.
-MOST_VALUES = 10_000_000
 _NODES = (1 + chebyshev_nodes(DEGREE)) / 2
 # Values at the nodes of [0, 1] to the coefficients of the powers.
 _POWERS = to_powers(_NODES)
 _CHEBYSHEV = to_chebyshev(chebyshev_nodes(DEGREE))
 _FACTORIALS = np.cumprod([1.0, *range(1, DEGREE + 1)])
-# Values at a time in one evaluation of the motion: the functions phi of so many stay in a cache.
-BLOCK = 10_000
 # Intervals of a grid of an engine's own, or of outputs that are looked at: no accuracy depends on it.
 OWN_INTERVALS = 500
-# A forcing may differ from a straight line by this part of its size before it is refused.
-STRAIGHT = 1e-7
 
 
 @dataclass(frozen=True)
@@ -91,7 +79,7 @@ def find_modes(matrix: Any) -> Eigensystem | None:
         return _lossless_modes(matrix, *lossless)
     values, vectors = np.linalg.eig(matrix)
     condition = float(np.linalg.cond(vectors))
-    if condition > LARGEST_CONDITION:
+    if condition > 1e4:  # by so much they may multiply rounding errors; that of a defective matrix is far beyond
         return None
     inverse = np.linalg.inv(vectors).astype(complex)
     upper = values.imag >= 0
@@ -149,15 +137,16 @@ def _lossless_modes(matrix: Array, scale: Array, speeds: NDArray[np.bool_]) -> E
 def phi(z: Complex, exponential: Complex, count: int) -> Complex:
     """phi_1 ... phi_count, (count, ...): phi_k = (phi_{k-1} - 1 / (k-1)!) / z, phi_0 = e^z.
 
-    Near zero, where these differences would cancel, the last one is summed as a series and the others follow from it.
+    Up to |z| = 2, where these differences would cancel, the last one is summed as a series of 24 terms and the others
+    follow from it.
 
     Args:
         z: where.
         exponential: e^z, which a caller has already.
         count: how many.
     """
-    small = np.abs(z) < NEAR
-    inverse = 1.0 / np.where(small, NEAR, z)  # one division for all: a complex one costs as much as five products
+    small = np.abs(z) < 2
+    inverse = 1.0 / np.where(small, 2, z)  # one division for all: a complex one costs as much as five products
     values = np.empty((count, *z.shape), dtype=complex)
     np.multiply(exponential - 1.0, inverse, out=values[0])
     for k in range(1, count):
@@ -165,7 +154,7 @@ def phi(z: Complex, exponential: Complex, count: int) -> Complex:
         values[k] *= inverse
     near = z[small]
     series = np.ones_like(near)
-    for term in range(count + SERIES_TERMS, count, -1):
+    for term in range(count + 24, count, -1):
         series *= near / term
         series += 1.0
     series /= math.factorial(count)
@@ -193,7 +182,7 @@ class Driven:
 
     def __call__(self, elapsed: Array) -> Array:
         """States (k, n) at times (k,) in s after the start."""
-        rows = max(1, BLOCK // self.starts.shape[1])
+        rows = max(1, 10_000 // self.starts.shape[1])  # the functions phi of so many values stay in a cache
         blocks = [self._at(elapsed[first : first + rows]) for first in range(0, len(elapsed), rows)]
         return np.concatenate([(block @ self.modes.vectors.T).real for block in blocks])
 
@@ -365,14 +354,14 @@ def straight_line(problem: Problem, forcing: Callable[[float], Array], piece: Sm
     """Level at the start of a piece and slope of u, from values strictly inside the piece.
 
     Raises:
-        ParameterError: u is no straight line.
+        ParameterError: u is no straight line, to 1e-7 of its size.
     """
     length = piece.high - piece.low
     times = [piece.low + part * length for part in (0.25, 0.5, 0.75)]
     early, middle, late = (np.asarray(forcing(time), dtype=float) for time in times)
     slope = (late - early) / (times[2] - times[0])
     bend = np.abs(middle - (early + late) / 2) - np.abs(slope) * np.spacing(piece.high)  # a short piece's times round
-    if (bend > STRAIGHT * (np.abs(early) + np.abs(late)).max(initial=0.0)).any():
+    if (bend > 1e-7 * (np.abs(early) + np.abs(late)).max(initial=0.0)).any():
         name = problem.names[int(np.argmax(bend))]
         raise ParameterError(
             f"The exact engine needs an input that is a straight line between breakpoints; the one of {name!r} bends "

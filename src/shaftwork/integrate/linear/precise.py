@@ -21,22 +21,14 @@ from shaftwork.integrate.smooth_intervals import PiecewiseDense, SmoothInterval,
 from shaftwork.integrate.stiffness import balance, scale_by
 from shaftwork.numerics.polynomials import Interpolant, chebyshev_nodes, interpolation_times, to_chebyshev
 
-# A product of two such numbers takes about this long on one core, s.
-PRODUCT = 3e-7
-# Of an output the evenly spaced run takes so many products of the matrix with a state.
-SERIES = 10
 # Between outputs the motion is polynomials of this degree, which leave out this part of the largest value of a state.
 DEGREE, LEFT_OUT = 20, 2e-14
-# A motion that rings in more panels than these goes on in floats from exact nodes; at few times it is computed anew.
-MOST_PANELS, FEW = 200, 64
+# A motion that rings in more panels than these goes on in floats from exact nodes.
+MOST_PANELS = 200
 Nearby = Callable[[Array, Array, Array], Array]
 _COEFFICIENTS = to_chebyshev(chebyshev_nodes(DEGREE))
 # The exponential of a matrix of this norm has a series of few terms; those of longer times are its squares.
 UNIT = 2.0**-24
-# Digits after the point besides those that the squares lose, and the largest power of two that a motion may reach.
-DIGITS, LARGEST = 192, 1023
-# So many of the last digits are rounding: a series ends where its terms have no others.
-ROUNDED = 48
 Integers = Any
 """An array of Python's whole numbers."""
 
@@ -57,7 +49,7 @@ class FixedPoint:
         unit = UNIT / norm if norm > 0 else length
         self._unit = Fraction(2) ** math.floor(math.log2(min(unit, length)))
         self.squares = math.ceil(math.log2(length / float(self._unit))) + 1
-        self.bits = DIGITS + 2 * self.squares
+        self.bits = 192 + 2 * self.squares  # the squares lose two digits each
         self._powers: list[Integers] = []
 
     def whole(self, values: Any) -> Integers:
@@ -97,7 +89,7 @@ class FixedPoint:
         rate, shares = self.whole(self._matrix * self._unit), self.whole([time / self._unit for time in times])
         total = term = block
         order = 0
-        while (abs(term) >> ROUNDED).any():
+        while (abs(term) >> 48).any():  # its last 48 digits are rounding
             order += 1
             term = ((rate @ term >> self.bits) * shares >> self.bits) // order
             total = total + term
@@ -110,7 +102,7 @@ class FixedPoint:
             self._powers.append(self.nudge(one, [self._unit] * len(one)))
         while len(self._powers) <= place:
             square = self._powers[-1] @ self._powers[-1] >> self.bits
-            if max(abs(square.max()), abs(square.min())) >> (self.bits + LARGEST):
+            if max(abs(square.max()), abs(square.min())) >> (self.bits + 1023):  # no float is as large
                 raise OverflowError("the motion is unbounded")
             self._powers.append(square)
         return self._powers[place]
@@ -155,7 +147,8 @@ class PreciseSystem:
 def seconds(states: int, turns: float, outputs: int) -> float:
     """About how long a run takes, from the product of its fastest rate and its length."""
     size, squares = states + 2, 25 + math.log2(max(turns, 1.0))
-    return PRODUCT * (squares * size**3 + outputs * size**2 * SERIES)
+    # a product of two numbers takes 0.3 us on one core, an output of an evenly spaced run ten of a matrix and a state
+    return 3e-7 * (squares * size**3 + 10 * outputs * size**2)
 
 
 @dataclass(frozen=True)
@@ -249,7 +242,7 @@ class PrecisePiece:
 
     def at(self, times: Array) -> Array:
         """States (k, n) at times (k,)."""
-        if times.size <= FEW or are_even(times):
+        if times.size <= 64 or are_even(times):  # a few are computed as fast as panels are made
             return self.exactly(times)
         if self.panels is None:
             return self.nearby(*self._nodes, times)

@@ -12,8 +12,6 @@ import numpy as np
 
 from shaftwork.core.errors import ParameterError
 from shaftwork.integrate.linear.linear_system import (
-    FEWEST,
-    MOST_VALUES,
     OWN_INTERVALS,
     LinearSystem,
     are_even,
@@ -38,14 +36,10 @@ from shaftwork.integrate.stiffness import LARGEST_EIGENVALUES
 
 # Measured on one core: a dense product does about this many multiplications a second, a sparse product takes this long.
 DENSE_RATE, SPARSE_CALL, SPARSE_RATE = 1e10, 1e-5, 5e8
-# Products with A that the truncated Taylor series of `expm_multiply` takes for a unit of (norm of A) * time.
-TAYLOR_PRODUCTS = 6.0
-# Of the first interval after a jump of an input: the shortest is still told from rounding.
-MOST_HALVINGS = 40
 # States up to which inputs that are no straight lines are followed mode by mode.
 LARGEST_DRIVEN = 600
-# A run that rounding spoils is made in whole numbers up to this estimate of its time, s.
-LONGEST_PRECISE = 10.0
+# An exact run is made up to this estimate of its time in s, and one in whole numbers, where rounding spoils it, too.
+LONGEST_EXACT = 10.0
 
 
 def solve(problem: Problem) -> Trajectory:
@@ -168,7 +162,7 @@ def _precise(problem: Problem, system: LinearSystem) -> PreciseSystem | None:
     """The system in whole numbers; None where a run would take too long, or inputs are no straight lines."""
     turns = system.norm * (problem.t_end - problem.t0)
     outputs = OWN_INTERVALS if problem.t_eval is None else problem.t_eval.size
-    slow = seconds(problem.x0.size, turns, outputs) > LONGEST_PRECISE
+    slow = seconds(problem.x0.size, turns, outputs) > LONGEST_EXACT
     return None if slow or problem.straight is None else precise_system(problem, problem.straight)
 
 
@@ -194,10 +188,13 @@ def _inputs(problem: Problem, linear: LinearInputs) -> dict[SmoothInterval, Arra
     spans, duration = pieces(problem), problem.t_end - problem.t0
 
     def resolved() -> dict[SmoothInterval, Array] | None:
-        values, left = dict[SmoothInterval, Array](), MOST_VALUES
+        # inputs of more values, states by nodes, are left to engines that step
+        values, left = dict[SmoothInterval, Array](), 10_000_000
         for piece in spans:
             length = piece.end - piece.start
-            nodes = polynomials(partial(_inside, linear, piece), length, math.ceil(FEWEST * length / duration), left)
+            # where an input is nothing but short blows, the nodes of fewer panels in a run may all lie between these
+            fewest = math.ceil(512 * length / duration)
+            nodes = polynomials(partial(_inside, linear, piece), length, fewest, left)
             if nodes is None:
                 return None
             values[piece], left = nodes, left - nodes.size
@@ -228,7 +225,8 @@ def _dense_cost(problem: Problem) -> float:
 
 def _sparse_cost(problem: Problem, linear: LinearInputs) -> float:
     system = system_of(linear)
-    products = TAYLOR_PRODUCTS * system.norm * (problem.t_end - problem.t0) + 20 * _size(problem)[1]
+    # of the truncated Taylor series of `expm_multiply`
+    products = 6 * system.norm * (problem.t_end - problem.t0) + 20 * _size(problem)[1]
     return float(products * (SPARSE_CALL + system.matrix.nnz / SPARSE_RATE))
 
 
@@ -271,7 +269,8 @@ class _ExactDense:
 
     def _graded(self, nodes: Array) -> Array:
         first = float(nodes[1] - nodes[0])
-        halvings = int(np.clip(np.ceil(np.log2(max(1.0, self._rate * first))), 0, MOST_HALVINGS))
+        # the shortest is still told from rounding
+        halvings = int(np.clip(np.ceil(np.log2(max(1.0, self._rate * first))), 0, 40))
         return np.concatenate([nodes[:1] + first * 0.5 ** np.arange(halvings, 0, -1), nodes])
 
     def __call__(self, times: Array) -> Array:

@@ -13,20 +13,18 @@ from shaftwork.integrate.problem import TOLERATED, UNSURPRISING, Array, Observed
 
 # A state that changes by less, as a part of what its rate is made of, stands still but for rounding.
 STILL = 64 * float(np.finfo(float).eps)
-# A smaller error than this is not said of an engine, whatever its tolerance: rounding adds up over its steps.
-SMALLEST = 1e-9
 
 
-def objection(problem: Problem, trajectory: Trajectory, engine: str) -> str | None:
+def objection(problem: Problem, observed: Observed, trajectory: Trajectory, engine: str) -> str | None:
     """What must be said of a run of a linear network, or None.
 
     Args:
         problem: what was solved.
-        trajectory: the run.
+        observed: all quantities of the network.
+        trajectory: the run, with a time at least.
         engine: that made it.
     """
-    observed = problem.observed
-    if observed is None or not trajectory.t.size or _goes_on_as_it_is(problem, trajectory):
+    if _goes_on_as_it_is(problem, trajectory):
         return None
     chosen = samples(trajectory.t.size)
     chosen = chosen[~np.isin(trajectory.t[chosen], problem.breakpoints)]  # values there have two sides
@@ -47,7 +45,7 @@ def objection(problem: Problem, trajectory: Trajectory, engine: str) -> str | No
     if run is None:
         return None
     added_up = min(trajectory.statistics.get("steps", 0) * problem.rtol, UNSURPRISING)
-    allowed = max(TOLERATED * problem.rtol, added_up, SMALLEST)
+    allowed = max(TOLERATED * problem.rtol, added_up, 1e-9)  # rounding adds up, too, whatever the tolerance
     limit = max(allowed - run.doubt, run.doubt)  # the exact motion may itself be off so far, either way
     wanted = observed.values(times, run.x)
     part, name = _part(observed, trajectory, np.abs(values - wanted).max(axis=0, initial=0.0), wanted, limit)

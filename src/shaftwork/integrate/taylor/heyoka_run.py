@@ -17,12 +17,8 @@ from shaftwork.integrate.taylor.heyoka_switches import SOMEWHERE, SwitchWatch, k
 
 # What heyoka's outcomes are called here where a guard ended the run.
 GUARD = "guard"
-# Trials of a first step whose series does not satisfy the equations, each so much shorter.
-FIRST_TRIALS, SHORTER = 30, 0.25
 # Where in a step a series is compared with the equations, as parts of the step: not at its end, where a law may jump.
 INSIDE = (0.5, 0.9)
-# Part of what a state moves by which its slope may differ from its rate within a step.
-DEFECT = 1e-8
 # What is the least that rounding moves a guard of size 1.
 ROUNDING = 8 * float(np.finfo(float).eps)
 # Part of its size by which a guard at the instant of a switch may be below its limit and be met by rounding.
@@ -165,19 +161,19 @@ class TaylorRun:
         """
         integrator, longest = self.integrator, math.inf
         start, state, parameters = integrator.time, integrator.state.copy(), integrator.pars.copy()
-        for _ in range(FIRST_TRIALS):
+        for _ in range(30):
             integrator.step(max_delta_t=min(longest, piece.end - piece.start), write_tc=True)
             step = integrator.time - start
             good = not (step > 0.0 and np.isfinite(integrator.state).all()) or (
                 _satisfied(self.problem, self.problem.rhs, piece, integrator.tc, start, INSIDE[-1] * step, 0.0)
-                and keeps_sides(self.program, integrator, parameters, start)
+                and (self.program.all_timed or keeps_sides(self.program, integrator, parameters, start))
             )
             integrator.time = start
             integrator.state[:], integrator.pars[:] = state, parameters
             integrator.reset_cooldowns() if integrator.with_events else None
             if good:
                 break
-            longest = SHORTER * step
+            longest = step / 4
         return longest
 
     def verify(self, piece: SmoothInterval, segments: Sequence[Any]) -> None:
@@ -262,4 +258,4 @@ def _satisfied(
     with np.errstate(all="ignore"):
         defect = np.abs(np.multiply(elapsed, rhs(piece.inside(start + elapsed), state)) - change)
     moved = np.maximum(np.abs(state), sizes) + np.abs(change)
-    return bool((defect <= DEFECT * moved + problem.atol).all())
+    return bool((defect <= 1e-8 * moved + problem.atol).all())

@@ -8,21 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.integrate.problem import Array
+from shaftwork.numerics.tolerances import EPS, GOLDEN
 from shaftwork.numerics.zeros import LOOKS
 
-# So many steps in a row, each shorter than this part of the whole time, are chatter and not motion.
-CHATTER_STEPS, CHATTER_SPAN = 200, 1e-9
 # A switch that is on the wrong side by more than this part of its largest value has missed its event.
 WRONG_SIDE = 1e-9
-# What comes back on one side more slowly than at this part of the speed on the other may be a touch.
-BACK = 1e-3
 # How far rounding may have moved time and states, as a part of them.
-ROUNDINGS = 256 * float(np.finfo(float).eps)
-# Where in a trial step a switch that starts at zero is looked at: as early as it is not lost in rounding.
-EARLY = (1e-4, 1e-2, 1e-1)
+ROUNDINGS = 256 * EPS
 
 # Where in a piece switches of the time are read: a law that touches its threshold does so in the middle, if anywhere.
-SOMEWHERE = 0.381966
+SOMEWHERE = 1.0 - GOLDEN
 # Where in a step the sides of the switches are looked at, its end included.
 INSIDE = np.append(LOOKS[1:-1], 1.0)
 
@@ -87,7 +82,7 @@ def _early_signs(program: Any, integrator: Any, horizon: float) -> Array:
     integrator.step(max_delta_t=horizon, write_tc=True)
     step = integrator.time - start
     signs = np.zeros(len(program.switches))
-    times = start + np.outer(EARLY, (0.5, 1.0)).ravel() * step
+    times = start + np.outer((1e-4, 1e-2, 1e-1), (0.5, 1.0)).ravel() * step  # as early as it is not lost in rounding
     sides = np.sign(_in_step(program, integrator, times, parameters))
     for first, second in zip(sides.T[::2], sides.T[1::2], strict=True):
         signs = np.where((signs == 0.0) & (first == second), second, signs)  # rounding would have no steady sign
@@ -119,8 +114,6 @@ def keeps_sides(program: Any, integrator: Any, parameters: Array, start: float) 
         parameters: all parameters before the step, the signs included.
         start: of the step, s.
     """
-    if program.all_timed:
-        return True
     signs = parameters[program.signs]
     values = _in_step(program, integrator, start + INSIDE * (integrator.time - start), parameters)
     return bool((signs[:, None] * values >= -WRONG_SIDE * np.abs(values).max(axis=1)[:, None]).all())
@@ -138,7 +131,8 @@ class SwitchWatch:
 
     def __init__(self, program: Any, start: float, duration: float, size: Array) -> None:
         self._program = program
-        self._short = CHATTER_SPAN * duration
+        self._short = 1e-9 * duration
+        """Many shorter steps in a row are chatter and not motion."""
         self._short_steps = 0
         self._last = start
         self.last_good: tuple[float, Array] | None = None
@@ -185,8 +179,17 @@ class SwitchWatch:
                 passed, whole = cooldown
                 self._cooled[number] = integrator.time - passed + whole
         if past.any():
-            # Right at its event (heyoka still "cools" it down) a switch may be on the wrong side by rounding.
-            past &= [cooldown is None for cooldown in cooling]
+            # Right at its event (heyoka still "cools" it down) a switch may be on the wrong side by rounding. It comes
+            # over then. One that rounding made turn, as a speed to which a motion has hardly come yet, may cool for
+            # long, and go on to the side on which it is without an event.
+            away = [
+                cooldown is None or (bool(past[number]) and self._goes_away(integrator, number))
+                for number, cooldown in enumerate(cooling)
+            ]
+            for number, cooldown in enumerate(cooling):
+                if cooldown is not None:
+                    wrong[number] = wrong[number] and away[number] and self._moved(integrator, number)
+            past &= away
             # In a step too short for heyoka to see an event a switch is past it by that step, and has just turned too.
             wrong &= past & (integrator.time - self._last >= self._short)
             # A speed that dies away turns while heyoka still cools its last turn down: wrong only where it matters.
@@ -209,7 +212,7 @@ class SwitchWatch:
         stuck = None
         if wrong is not None and wrong.any():
             stuck = np.argmax(wrong)
-        elif self._short_steps > CHATTER_STEPS:
+        elif self._short_steps > 200:
             stuck = np.argmin(np.where(self._moving, np.abs(values), np.inf))
         if stuck is not None:
             self.driven_back = self._drives_back(integrator, int(stuck))
@@ -223,13 +226,30 @@ class SwitchWatch:
         self.last_good = now, integrator.state.copy()
         return True
 
-    def _matters(self, integrator: Any, number: int) -> bool:
-        """Whether the motion is another one on the other side of a switch."""
+    def _moved(self, integrator: Any, number: int) -> bool:
+        """Whether the last step would have ended elsewhere, by more than rounding, on the other side of a switch."""
+        here, there = self._both_sides(integrator, number)
+        moved = np.abs(here - there).max() * (integrator.time - self._last)
+        return bool(moved > EPS * np.abs(integrator.state).max())
+
+    def _both_sides(self, integrator: Any, number: int) -> tuple[Array, Array]:
+        """(n,) slopes with the sign of a switch and with the other one."""
         other = integrator.pars.copy()
         other[self._signs.start + number] *= -1.0
-        here, there = (
-            self._program.slopes(integrator.time, integrator.state, each) for each in (integrator.pars, other)
-        )
+        slopes, at = self._program.slopes, (integrator.time, integrator.state)
+        return slopes(*at, integrator.pars), slopes(*at, other)
+
+    def _goes_away(self, integrator: Any, number: int) -> bool:
+        """Whether a switch goes on to the side of zero on which it is."""
+        time, state, pars = integrator.time, integrator.state, integrator.pars
+        later = state + self._short * self._program.slopes(time, state, pars)
+        here = self._program.switch_values(time, state, pars)[number]
+        there = self._program.switch_values(time + self._short, later, pars)[number]
+        return bool(here * (there - here) > 0.0)
+
+    def _matters(self, integrator: Any, number: int) -> bool:
+        """Whether the motion is another one on the other side of a switch."""
+        here, there = self._both_sides(integrator, number)
         return not np.allclose(here, there, rtol=WRONG_SIDE, atol=0.0)
 
     def _drives_back(self, integrator: Any, number: int) -> bool:
@@ -243,7 +263,8 @@ class SwitchWatch:
             here = program.switch_values(time, state, pars)[number]
             there = program.switch_values(time + self._short, later, pars)[number]
             speeds.append(side * (there - here))
-        return bool(max(speeds) < -BACK * max(map(abs, speeds)) < 0.0)
+        # What comes back on one side more slowly than at 1e-3 of the speed on the other may be a touch.
+        return bool(max(speeds) < -1e-3 * max(map(abs, speeds)) < 0.0)
 
     def _ended_at_a_switch(self, integrator: Any) -> bool:
         """Whether the last step ended where a switch passed through zero."""

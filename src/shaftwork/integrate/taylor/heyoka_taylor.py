@@ -17,21 +17,8 @@ from shaftwork.integrate.smooth_intervals import PiecewiseDense, both_sides, fai
 from shaftwork.integrate.taylor.heyoka_run import GUARD, TaylorRun
 from shaftwork.integrate.taylor.heyoka_switches import SwitchWatch
 
-# The cost grows only with the logarithm of the tolerance, and a loose one loses events.
-LOOSEST_TOLERANCE = 1e-10
-
-# Its one tolerance is a part of the largest state, which torques are. Speeds keep some five digits more than that, in
-# measured motions with gaps and clutches; where torques are larger beside them, it is tightened by so much.
-MORE_DIGITS = 1e5
-
 # Steps times states, some 50 ms, after which Python notices Ctrl-C and tells how far the run is.
 UNINTERRUPTED = 250_000
-# heyoka's outcomes proper are below this number; those above are events that have ended a run.
-FIRST_OUTCOME = -(2**32)
-# Output times that heyoka is given at once where a guard is likely to be met before the last of them.
-CHUNK = 32
-# Two runs of one problem end at times that differ by less of its span.
-ALIKE = 1e-6
 
 
 def solve(problem: Problem) -> Trajectory:
@@ -67,9 +54,14 @@ def solve(problem: Problem) -> Trajectory:
 
 
 def _tolerance(problem: Problem) -> float:
-    ordinary = min(max(problem.rtol, ENGINES["heyoka"].finest), LOOSEST_TOLERANCE)
+    """heyoka's one tolerance, a part of the largest state, which torques are.
+
+    Speeds keep some five digits more than that, in measured motions with gaps and clutches; where torques are larger
+    beside them, it is tightened by so much.
+    """
+    ordinary = min(max(problem.rtol, ENGINES["heyoka"].finest), ENGINES["heyoka"].loosest)
     finest, coarsest = problem.atol.min(initial=np.inf), problem.atol.max(initial=0.0)
-    tightened = problem.rtol * MORE_DIGITS * finest / coarsest if 0.0 < finest < coarsest else ordinary
+    tightened = problem.rtol * 1e5 * finest / coarsest if 0.0 < finest < coarsest else ordinary
     # in powers of ten, as each value compiles an integrator of its own
     return problem.overall * (ordinary if ordinary <= tightened else 10.0 ** math.floor(math.log10(tightened)))
 
@@ -82,7 +74,8 @@ def _on_grid(problem: Problem, times: Array) -> Trajectory:
 def _filled(run: TaylorRun, times: Array) -> Trajectory:
     problem, stops = run.problem, list[float]()
     states = np.empty((times.size, run.state.size))
-    done, chunk = 0, times.size + 1 if problem.guards is None else CHUNK
+    # where a guard is likely to be met before the last of them, not all times are given to heyoka at once
+    done, chunk = 0, times.size + 1 if problem.guards is None else 32
     for piece in pieces(problem):
         # An output at a breakpoint belongs to the next piece: it is the state after the jump.
         stop = times.size if piece.end == problem.t_end else int(np.searchsorted(times, piece.end, side="left"))
@@ -122,7 +115,7 @@ class _TaylorReplay:
                     run.verify(piece, recorders[-1].segments)
                 if run.met is not None:
                     break
-            if self._end is not None and abs(run.integrator.time - self._end) > ALIKE * (problem.t_end - problem.t0):
+            if self._end is not None and abs(run.integrator.time - self._end) > 1e-6 * (problem.t_end - problem.t0):
                 reason = f"the same run made again for its dense output ends there, not at t = {self._end:.9g} s"
                 raise failure(problem, "heyoka", run.integrator.time, run.state, reason)
         return tuple(tuple(recorder.segments) for recorder in recorders), run.met
@@ -261,7 +254,7 @@ def _outcome(outcome: Any, watch: SwitchWatch | None, *, arrived: bool) -> str:
     A run that has come to a stop on its way with its last step has met the limit of its steps, not its end.
     """
     failed = watch is not None and watch.reason is not None
-    if int(outcome) > FIRST_OUTCOME and not failed:
+    if int(outcome) > -(2**32) and not failed:  # heyoka's outcomes proper are below; these are events that end a run
         return GUARD
     if arrived and not failed:
         return "time_limit"

@@ -13,10 +13,6 @@ from shaftwork.numerics.polynomials import radau_nodes, to_integrals, to_legendr
 STAGES = 8
 # The part of the tolerance that what a panel leaves out may take.
 RESOLVED = 0.1
-# A line whose waves are weaker than this part of the strongest, in the root of their power, is resolved no better.
-IDLE = 1e-3
-# The scale follows what has grown by more than this factor.
-GROWTH = 1.2
 
 # Gauss points of [-1, 1], where the values of all waves and states are kept, and their weights.
 POINTS, WEIGHTS = legendre.leggauss(STAGES)
@@ -119,12 +115,14 @@ class Scales:
         ends = largest[..., : self._ends]
         lines = ends.reshape(*ends.shape[:-1], -1, 2).max(axis=-1)
         strongest = (lines / self._root).max(axis=-1, initial=0.0)[..., None]
-        ends[...] = np.repeat(np.maximum(lines, IDLE * self._root * strongest), 2, axis=-1)
+        # A line whose waves are a thousand times weaker than the strongest, in the root of their power, is resolved no
+        # better.
+        ends[...] = np.repeat(np.maximum(lines, 1e-3 * self._root * strongest), 2, axis=-1)
         return np.asarray(self._absolute + self._rtol * largest)
 
     def _with(self, rows: Array) -> tuple[Array, Array]:
         sizes = np.abs(rows).max(axis=1)
-        if (sizes <= GROWTH * self._largest).all():
+        if (sizes <= 1.2 * self._largest).all():  # what has grown by less does not change the scale
             return self._largest, self.tolerance
         largest = np.maximum(sizes, self._largest)
         return largest, self.tolerances(largest)

@@ -24,17 +24,10 @@ from shaftwork.waves.delay_engine.lines import DelayProblem, DelayTrajectory
 from shaftwork.waves.delay_engine.march import March
 from shaftwork.waves.delay_engine.waveforms import one_sided, trajectory
 
-# Delays are whole multiples of a part of the shortest one, up to rounding, and no longer than so many of them.
-MOST_PARTS, MOST_PERIODS = 12, 64
-# More panels in a period, or unknowns in a panel, are left to the march.
-MOST_PANELS, MOST_ROWS = 16, 400
+LONG = 20_000
+"""A motion of more panels after its last breakpoint, and of 100 for each output, is leapt through."""
 MOST_PANELS_FAR = 64
-# A motion of fewer panels is short. One of more, and of more for each output, is leapt through after so many periods.
-SHORT, LONG, LONG_GAP, BEGINNING = 2_000, 20_000, 100, 256
-# Periods of the first leap. It is marched, since every rounding of it is doubled with every power.
-LEAP = 256
-# Motions that are marched side by side, from their leaps' ends to the panels to be read.
-SIDE_BY_SIDE = 64
+"""Panels of a period up to which one that is leapt through is made finer."""
 
 
 def solve(problem: DelayProblem) -> DelayTrajectory:
@@ -92,8 +85,8 @@ def on_lattice(problem: DelayProblem) -> DelayTrajectory | None:
     matrices, twice = Matrices.of(problem), 2 * np.repeat(problem.impedances, 2)
     map_of = cache(lambda length: panel_map(matrices, twice, length * period))
     rtol = max(problem.rtol, WAVE.finest)
-    # A beginning shows which panels are too long; a short motion shows it as fast.
-    resolved = (problem.t_end - problem.t0) / period * len(pattern) < SHORT
+    # A beginning shows which panels are too long; a motion of 2000 panels shows it as fast.
+    resolved = (problem.t_end - problem.t0) / period * len(pattern) < 2_000
     while True:
         lattice = Lattice(problem, map_of, period, multiples, pattern)
         far = _is_long(lattice)  # a long motion scrambles its modes, and the march cannot take it over
@@ -106,7 +99,7 @@ def on_lattice(problem: DelayProblem) -> DelayTrajectory | None:
             bad = lattice.unresolved(lattice.run(min(lattice.count, beginning)), rtol)
         resolved = not any(bad)
         pattern = _refined(pattern, bad)
-        if not far and not resolved and len(pattern) > MOST_PANELS:
+        if not far and not resolved and len(pattern) > 16:  # left to the march
             return None
 
 
@@ -114,7 +107,7 @@ def _is_long(lattice: Lattice) -> bool:
     problem = lattice.problem
     if not problem.steady or problem.t_eval is None:
         return False
-    return bool(lattice.count - lattice.edges[-2] > max(LONG, LONG_GAP * problem.t_eval.size))
+    return bool(lattice.count - lattice.edges[-2] > max(LONG, 100 * problem.t_eval.size))
 
 
 def _whole(lattice: Lattice, rtol: float) -> tuple[DelayTrajectory | None, list[bool]]:
@@ -129,7 +122,7 @@ def _whole(lattice: Lattice, rtol: float) -> tuple[DelayTrajectory | None, list[
 def _far(lattice: Lattice, rtol: float) -> tuple[DelayTrajectory | None, list[bool]]:
     """As `_whole`, for a long motion of few outputs."""
     times = np.asarray(lattice.problem.t_eval, dtype=float)
-    run = lattice.run(lattice.edges[-2] + max(BEGINNING * lattice.size, lattice.reach))
+    run = lattice.run(lattice.edges[-2] + max(256 * lattice.size, lattice.reach))  # 256 periods
     leaps = PeriodicPropagation(lattice, run)
     read = np.unique(lattice.panels(times))
     late = leaps.run(np.append(read[read >= leaps.first], lattice.count - 1))
@@ -155,11 +148,13 @@ def _measure(problem: DelayProblem) -> tuple[float, tuple[int, ...]] | None:
     """A period in s and how many of them the delay of each line lasts."""
     size = (problem.x0.size + 2 * problem.delays.size) * STAGES
     shortest = float(problem.delays.min())
-    for parts in range(1, MOST_PARTS + 1):
+    # Delays are whole multiples of a part of the shortest one, up to rounding, and no longer than 64 of them; panels of
+    # more unknowns are left to the march.
+    for parts in range(1, 13):
         ratios = problem.delays * parts / shortest
         multiples = np.round(ratios)
-        if (np.abs(ratios - multiples) <= SAME * multiples).all() and multiples.max() <= MOST_PERIODS:
-            return (shortest / parts, tuple(multiples.astype(int).tolist())) if size <= MOST_ROWS else None
+        if (np.abs(ratios - multiples) <= SAME * multiples).all() and multiples.max() <= 64:
+            return (shortest / parts, tuple(multiples.astype(int).tolist())) if size <= 400 else None
     return None
 
 
@@ -192,7 +187,8 @@ class PeriodicPropagation:
         self._lattice, self.first = lattice, len(run.numbers)
         window = run.waves[-lattice.reach :]
         self._shape, self._n = window.shape, run.starts.shape[1]
-        self._length = LEAP * lattice.size
+        # The first leap is marched over 256 periods: each squaring doubles its roundings.
+        self._length = 256 * lattice.size
         self._input = lattice.inputs(pieces(lattice.problem)[-1], self.first, self.first + 1)
         numbers = self.first + np.arange(self._length)
         self._drive = lattice.applied(np.repeat(self._input, self._length, axis=0), numbers, "drive")[:, :, None]
@@ -213,9 +209,10 @@ class PeriodicPropagation:
                     places = matrix @ places
             done = leap
             pasts.append(places[:-1])
+        width = 64  # motions marched side by side, from the ends of their leaps to the panels to be read
         parts = [
-            self._panels(np.column_stack(pasts[low : low + SIDE_BY_SIDE]), steps[low : low + SIDE_BY_SIDE])
-            for low in range(0, len(panels), SIDE_BY_SIDE)
+            self._panels(np.column_stack(pasts[low : low + width]), steps[low : low + width])
+            for low in range(0, len(panels), width)
         ]
         starts, waves, arrived, squares = (np.concatenate(part) for part in zip(*parts, strict=True))
         inputs = np.broadcast_to(self._input, (len(panels), self._input.shape[1]))

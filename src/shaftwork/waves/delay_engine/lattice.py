@@ -30,12 +30,6 @@ from shaftwork.waves.delay_engine.waveforms import WavePanels, trajectory
 
 # Numbers of panels.
 Numbers = NDArray[np.intp]
-# So many numbers may describe the past of a motion that is marched in blocks side by side.
-LARGEST_BLOCK = 300
-# Numbers of so large a size show the matrices of an affine function without the rounding of its constant.
-PROBE = 2.0**40
-# They are seen so early in the first piece, at a share of it: later a law may have lost its value.
-EARLY = 1 / 1024
 
 
 @dataclass(frozen=True)
@@ -59,10 +53,12 @@ class Matrices:
         """The matrices of a linear problem."""
         n, q = problem.x0.size, 2 * problem.delays.size
         piece = pieces(problem)[0]
-        t = np.full(2 * (n + q), piece.low + EARLY * (piece.high - piece.low))
-        both = PROBE * np.hstack([np.eye(n + q), -np.eye(n + q)])
+        probe = 2.0**40  # so large that the slopes show without the rounding of the constants
+        # early in the first piece: later a law may have lost its value
+        t = np.full(2 * (n + q), piece.low + (piece.high - piece.low) / 1024)
+        both = probe * np.hstack([np.eye(n + q), -np.eye(n + q)])
         slopes, speeds = (np.asarray(f(t, both[:n], both[n:])) for f in (problem.rhs, problem.speeds))
-        slopes, speeds = ((f[:, : n + q] - f[:, n + q :]) / (2 * PROBE) for f in (slopes, speeds))
+        slopes, speeds = ((f[:, : n + q] - f[:, n + q :]) / (2 * probe) for f in (slopes, speeds))
         return cls(slopes[:, :n], slopes[:, n:], speeds[:, :n], speeds[:, n:])
 
 
@@ -252,7 +248,8 @@ class Lattice:
         """States (m + 1, n) and waves (m, q, s) of panels from the `first` on, m rows of `drive`."""
         count = len(drive)
         length = self.size * max(1, round(math.sqrt(count / self.size)))
-        blocks = count // length if self._n + self.reach * self._q * STAGES <= LARGEST_BLOCK else 0
+        # Blocks are marched side by side where at most 300 numbers describe the past of one.
+        blocks = count // length if self._n + self.reach * self._q * STAGES <= 300 else 0
         states, waves = [], []
         if blocks:
             driven = drive[: blocks * length].reshape(blocks, length, -1).transpose(1, 2, 0)

@@ -29,11 +29,6 @@ from shaftwork.waves.delay_engine.lines import DelayProblem, Lines, WaveHistory,
 from shaftwork.waves.delay_engine.stages import CollocationStages
 from shaftwork.waves.delay_engine.waveforms import Polynomials, Restriction, StatesDense, WavePanels
 
-# The shortest panel takes this part of rtol times the shortest delay.
-SHORTEST = 1e-2
-# A panel may leave out this part of a guard that changes with time by itself.
-SEEN = 1e-3
-
 
 @dataclass
 class MarchEquations:
@@ -86,7 +81,8 @@ class March:
         self._rtol = max(problem.rtol, WAVE.finest)
         self._shortest = min(self._lines.delays)
         self._merge = max(8 * math.ulp(max(abs(low), abs(high))), 1e-4 * self._rtol * self._shortest)
-        self._floor = max(SHORTEST * self._rtol * self._shortest, 20 * self._merge)
+        # the shortest panel
+        self._floor = max(1e-2 * self._rtol * self._shortest, 20 * self._merge)
         self._ends = 2 * problem.delays.size
         self._twice = 2 * np.repeat(problem.impedances, 2)[:, None]
         past = past_of(problem)
@@ -249,7 +245,8 @@ class March:
         timed = list(self._problem.timed)
         values = self._problem.guards.values(times, restriction(times))[:, timed].T
         least = self._problem.guards.offsets[timed]  # what arrives may hold a guard at its limit, but for rounding
-        return bool((left_out(values, np.empty(0)) <= SEEN * np.abs(values).max(axis=1) + least).all())
+        # a panel may leave out a thousandth of a guard that changes by itself
+        return bool((left_out(values, np.empty(0)) <= 1e-3 * np.abs(values).max(axis=1) + least).all())
 
     def _accept(self, panel: _Panel) -> None:
         if len(self._states) - self._span.first >= self._problem.max_steps:

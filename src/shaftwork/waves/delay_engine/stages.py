@@ -14,12 +14,6 @@ from shaftwork.integrate.problem import Array
 from shaftwork.waves.delay_engine.collocation import GAUSS, LEFT, POINTS, RIGHT, STAGES, Scheme
 from shaftwork.waves.delay_engine.lines import DelayProblem
 
-# Newton's method stops at this part of the tolerance; a step that shrinks less than to SLOW wants a new Jacobian.
-CONVERGED, SLOW, ITERATIONS = 1e-4, 0.1, 15
-# Up to here the inverse of a panel's matrix, of (states x stages) rows, is cheaper than a sparse factorisation.
-LARGEST_DENSE = 400
-# Panels of as many lengths keep their factors.
-LARGEST_STORE = 256
 # The part of a panel before its first Gauss point, and values at the points to those at both ends.
 UNSEEN = (1 + POINTS[0]) / 2
 _ENDS = np.column_stack([LEFT[:, 0], RIGHT[:, 0]])
@@ -90,7 +84,7 @@ class CollocationStages:
         problem, start = self._problem, x[:, None]
         stages = start + np.multiply.outer(trend, length * scheme.nodes)
         previous, fresh = math.inf, self._jacobian is None
-        for iteration in range(ITERATIONS):
+        for iteration in range(15):
             slopes = problem.rhs(times, stages, h)
             self.counts["rhs"] += STAGES
             residual = stages - start - length * (slopes @ scheme.matrix.T)
@@ -104,11 +98,12 @@ class CollocationStages:
             if problem.linear:
                 return stages
             scale = problem.atol + self._rtol * np.maximum(largest, np.abs(stages).max(axis=1))
-            size = float((np.abs(change).max(axis=1) / np.maximum(scale, np.finfo(float).tiny)).max()) / CONVERGED
+            # in parts of what Newton's method may leave, 1e-4 of the tolerance
+            size = float((np.abs(change).max(axis=1) / np.maximum(scale, np.finfo(float).tiny)).max()) / 1e-4
             rate = size / previous if previous > 0 else 0.0
             if size <= 1 or (iteration and rate < 0.5 and size * rate <= 1 - rate):
                 return stages
-            if rate > SLOW and not fresh:
+            if rate > 0.1 and not fresh:  # a new Jacobian makes steps shrink faster
                 self._jacobian, fresh = None, True
             elif rate > 1:
                 break
@@ -124,7 +119,8 @@ class CollocationStages:
 
     def _renew(self, time: float, x: Array, h: Array) -> None:
         jacobian = self._problem.jacobian(time, x, h)
-        small = x.size * STAGES <= LARGEST_DENSE
+        # The inverse of a panel's matrix of 400 rows is cheaper than a sparse factorisation.
+        small = x.size * STAGES <= 400
         if sparse.issparse(jacobian):
             jacobian = jacobian.toarray() if small else jacobian
         elif not small:
@@ -139,7 +135,7 @@ class CollocationStages:
         key = (round(fraction * 2**36), exponent, scheme is GAUSS)
         solver = self._solvers.get(key)
         if solver is None:
-            if len(self._solvers) >= LARGEST_STORE:
+            if len(self._solvers) >= 256:  # panels of as many lengths keep their factors
                 self._solvers.clear()
             solver = self._solvers[key] = _factorise(self._jacobian, length * scheme.matrix)
         return solver

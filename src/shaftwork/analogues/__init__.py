@@ -1,0 +1,1 @@
+"""Analogue circuits of a network: force-current (`Network.circuit`) and force-voltage (`Network.dual`)."""

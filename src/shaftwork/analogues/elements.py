@@ -1,0 +1,119 @@
+"""The elements of a network, one for each branch: what they are called, their values and their places."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from sympy import Expr, Float
+
+from shaftwork.components.laws import replaced
+from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart, ends_of
+from shaftwork.network.kinds import Kind
+from shaftwork.network.netlist import REFERENCE
+
+Edge = tuple[int, int]
+"""A branch and the number of its term, as `CircuitGraph.multigraph` keys them."""
+Sum = dict[str, float]
+"""A sum of quantities: the factor of each by name."""
+
+
+@dataclass(frozen=True)
+class Element:
+    """A branch with its numbers.
+
+    Args:
+        name: of the part that is made of it; that of its own part, where this has no other element.
+        symbol: of its own part, where it has the name of that.
+        kind: what its law is.
+        value: capacity, stiffness or conductance; of a law or source the number or expression of what
+            passes, or is across.
+        terms: of a coupling the factor of each term; else (1,).
+        edges: its keys in the graph, one for each term.
+        ends: the names of the nodes of each term.
+    """
+
+    name: str
+    symbol: str | None
+    kind: Kind
+    value: Any
+    terms: tuple[float, ...]
+    edges: tuple[Edge, ...]
+    ends: tuple[tuple[str, str], ...]
+
+
+class ElementNames:
+    """Names for elements and nodes that no part and no other element has.
+
+    Args:
+        graph: of the network.
+    """
+
+    def __init__(self, graph: CircuitGraph) -> None:
+        self._graph = graph
+        self._taken = {part.name for part in graph.parts}  # only asked for membership
+
+    def node(self, number: int) -> str:
+        """The name of a node; one inside a part loses its dot, which marks those alone."""
+        if number == GROUND:
+            return REFERENCE
+        name = self._graph.nodes[number]
+        owner, _, inner = name.rpartition(".")
+        return f"{owner} {inner}" if owner in self._taken else name
+
+    def of_branches(self, part: GraphPart, kept: int) -> Iterator[str]:
+        """A name for each branch of a part: its own for one of them, with the letter of the law behind it for others.
+
+        Args:
+            part: the part.
+            kept: the place of the branch that has the name of the part.
+        """
+        for place, index in enumerate(part.branches):
+            if place == kept:
+                yield part.name
+                continue
+            template = self._graph.branches[index].template
+            letter = template.symbols[0].name if len(template.symbols) == 1 else template.label or str(place + 1)
+            name, count = f"{part.name} {letter}", 1
+            while name in self._taken:
+                count += 1
+                name = f"{part.name} {letter} {count}"
+            self._taken.add(name)
+            yield name
+
+
+def is_linear(part: GraphPart, graph: CircuitGraph) -> bool:
+    """Whether all that a part is made of are stores, losses, sources over time and couplings, for good."""
+    templates = [graph.branches[index].template for index in part.branches]
+    return not part.modes and all(
+        template.kind is not Kind.LAW and not template.reads and template.line is None and not template.through
+        for template in templates
+    )
+
+
+def elements_of(part: GraphPart, graph: CircuitGraph, names: ElementNames) -> Iterator[Element]:
+    """The elements of a part, in the order of its branches; a coupling or a source has the name of the part."""
+    branches = [graph.branches[index] for index in part.branches]
+    first = next((place for place, branch in enumerate(branches) if branch.template.kind in FIRST), 0)
+    for name, branch in zip(names.of_branches(part, first), branches, strict=True):
+        keys, ends = [], []
+        for key, plus, minus in ends_of(branch):
+            keys.append(key)
+            ends.append((names.node(plus), names.node(minus)))
+        factors = tuple(float(in_numbers(factor, branch, graph)) for factor, _, _ in branch.terms) or (1.0,)
+        law = in_numbers(branch.template.law, branch, graph)
+        value = float(law) if law.is_number else law
+        symbol = part.component.symbol if name == part.name else None
+        yield Element(name, symbol, branch.template.kind, value, factors, tuple(keys), tuple(ends))
+
+
+FIRST = (Kind.COUPLING, Kind.ACROSS_SOURCE, Kind.THROUGH_SOURCE)
+"""Kinds of elements that have the name of their part where it has several elements."""
+
+
+def in_numbers(law: Expr, branch: GraphBranch, graph: CircuitGraph) -> Expr:
+    """A law with the values of its parameters."""
+    owner = graph.parts[branch.part].name
+    values = {symbol: Float(graph.parameters[f"{owner}.{symbol.name}"]) for symbol in branch.template.symbols}
+    return replaced(law, values)

@@ -1,0 +1,188 @@
+"""The loop of steps that scipy, SUNDIALS and the banded engine share: pieces, guards, switches and limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from shaftwork.integrate.crossings import Crossings
+from shaftwork.integrate.guards import GuardWatch
+from shaftwork.integrate.problem import Array, DaeProblem, Problem, TimedProblem
+from shaftwork.integrate.smooth_intervals import SmoothInterval, both_sides, failure, pieces, start_of_piece, used_up
+
+# A run has stalled when so many steps together advance by less than so many times this part of the whole time.
+STALL_STEPS, STALL_SPAN = 2000, 1e-10
+
+
+class Step(NamedTuple):
+    """A step that a method has made.
+
+    Args:
+        end: s.
+        state: (n,) there.
+        dense: times (k,) inside the step to states (k, n), until the next step is made.
+    """
+
+    end: float
+    state: Array
+    dense: Callable[[Array], Array]
+
+
+class Stepper(Protocol):
+    """A method as the loop uses it."""
+
+    engine: str
+    """Its name in messages."""
+    cuts_off: bool
+    """Whether a step may be cut off at a switch of a law, as no stage of it lies beyond; else it is made again."""
+
+    def open(self, piece: SmoothInterval, t: float, x: Array) -> Array:
+        """Begin anew at a time in s of a piece in a state (n,); the consistent state (n,) with which it begins."""
+        ...
+
+    def step(self, t: float, x: Array) -> Step | None:
+        """Make a step from where the last one was taken to; None where it was too long, and a shorter one is to follow.
+
+        Raises:
+            SimulationError: it cannot.
+        """
+        ...
+
+    def again(self, t: float, x: Array, end: float, longest: float) -> None:
+        """Make the next step from the start of the last one once more, up to an end in s, in steps of `longest` s."""
+        ...
+
+    def take(self, t: float, end: float, state: Array) -> None:
+        """Keep the last step, from a time in s up to an end in s with its state (n,): its own end, or one before it."""
+        ...
+
+
+@dataclass(frozen=True)
+class SteppedPiece:
+    """The steps of one smooth piece.
+
+    Args:
+        times: (s + 1,) their ends, s.
+        states: (s + 1, n) then.
+    """
+
+    times: list[float]
+    states: list[Array]
+
+
+class SteppedRun(NamedTuple):
+    """All steps of a run.
+
+    Args:
+        pieces: in order.
+        met: the guard that ended it, or None.
+    """
+
+    pieces: Sequence[SteppedPiece]
+    met: int | None
+
+    @property
+    def end(self) -> tuple[float, Array]:
+        """Time in s and state (n,) where it ended."""
+        last = self.pieces[-1]
+        return last.times[-1], last.states[-1]
+
+    @property
+    def steps(self) -> Array:
+        """(s,) every time at which a step ended, the start first."""
+        first, *others = self.pieces
+        return np.array([*first.times, *(time for piece in others for time in piece.times[1:])])
+
+    @property
+    def states(self) -> Array:
+        """(s, n) states then, before any jump."""
+        first, *others = self.pieces
+        return np.array([*first.states, *(state for piece in others for state in piece.states[1:])])
+
+    def both_sides(self, problem: TimedProblem) -> tuple[Array, Array]:
+        """Times (k,) and states (k, n) at the ends of the steps, on both sides of jumps."""
+        times = [np.array(piece.times) for piece in self.pieces]
+        return both_sides(problem, times, [np.array(piece.states) for piece in self.pieces])
+
+
+def march(problem: Problem | DaeProblem, stepper: Stepper) -> SteppedRun:
+    """Step through all pieces of a problem, up to the first guard that is met.
+
+    Raises:
+        SimulationError: the method failed, the run has stalled, or `max_steps` were not enough.
+    """
+    x, pace, done = np.asarray(problem.x0, dtype=float), Pace(problem), list[SteppedPiece]()
+    left, shortest = problem.max_steps, 1e-9 * (problem.t_end - problem.t0)
+    for piece in pieces(problem):
+        watch, crossings = GuardWatch(problem, piece.low, piece.high), Crossings(problem, piece)
+        t, x = piece.start, stepper.open(piece, piece.start, start_of_piece(problem, piece, x))
+        done.append(SteppedPiece([t], [x]))
+        while t < piece.end:
+            if left <= 0:
+                raise failure(problem, stepper.engine, t, x, used_up(problem))
+            left -= 1
+            step = stepper.step(t, x)
+            if step is None:
+                continue
+            guard = watch.cut(t, x, step.end, step.state, step.dense)
+            switch = crossings.cut(t, x, step.end, step.state, step.dense, again=not stepper.cuts_off)
+            if guard is not None and (switch is None or guard <= switch):
+                if step.end - t > shortest and not watch.follows(t, x, guard, step.dense):
+                    stepper.again(t, x, piece.end, (step.end - t) / 8)
+                    continue
+                end, switch = guard, None
+            else:
+                guard, end = None, step.end if switch is None else switch
+                if end < step.end and not stepper.cuts_off:
+                    stepper.again(t, x, end, np.inf)
+                    continue
+            state = step.state if end == step.end else step.dense(np.array([end]))[0]
+            stepper.take(t, end, state)
+            if (objection := pace.objection(end, rests=crossings.rests)) is not None:
+                raise failure(problem, stepper.engine, end, state, objection)
+            done[-1].times.append(end)
+            done[-1].states.append(state)
+            t, x = end, state
+            if guard is not None and t < piece.end:
+                return SteppedRun(done, watch.met)
+            if switch is not None and t < piece.end:
+                x = stepper.open(piece, t, x)
+    return SteppedRun(done, None)
+
+
+class Pace:
+    """Tells a run that goes on, in ever shorter steps, from one that has stalled; and whoever asks, how far it is.
+
+    Args:
+        problem: what is being solved.
+    """
+
+    def __init__(self, problem: TimedProblem) -> None:
+        self._progress, self._duration = problem.progress, problem.t_end - problem.t0
+        self._since, self._steps = problem.t0, 0
+
+    def objection(self, t: float, *, rests: bool = False) -> str | None:
+        """After each step to a time t in s: the reason to give up, or None.
+
+        Args:
+            t: end of the step, s.
+            rests: whether the motion rests at a switch of a law.
+        """
+        if self._progress is not None:
+            self._progress(t)
+        self._steps += 1
+        if self._steps % STALL_STEPS:
+            return None
+        advance, self._since = t - self._since, t
+        # Where it rests, ten million such steps would make a run. Where a law is as the square root of the speed, such
+        # a run would not end otherwise.
+        if advance >= STALL_STEPS * (1e-7 if rests else STALL_SPAN) * self._duration:
+            return None
+        return (
+            f"the last {STALL_STEPS} steps advanced by {advance:.2g} s only, as where the laws on both sides of a jump "
+            "drive the motion back to it. Give such a law a smooth transition, tanh(omega / 0.01) in place of "
+            "sign(omega)"
+        )

@@ -1,0 +1,121 @@
+"""The amplitude spectrum of a quantity over a span of a motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.fft import rfft
+from scipy.signal import find_peaks
+from scipy.signal.windows import hann
+
+from shaftwork.core.errors import ParameterError
+from shaftwork.core.parameters import in_si
+from shaftwork.core.screen import in_columns
+from shaftwork.results.observer import Array, Reader, span_of
+from shaftwork.results.plotting import new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FEWEST, MOST = 2**12, 2**18
+"""Samples of a span."""
+FOLDED = 1e-4
+"""Share of the power above 0.8 of the highest frequency up to which sampling is fine enough: what lies beyond that
+frequency would appear below it."""
+SHOWN = 10
+"""Peaks in the table."""
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Amplitudes of the sines of which a quantity is made up over a span, its mean left out.
+
+    Law: |FFT| of evenly spaced values under a Hann window, scaled so that a sine on a line of the spectrum has its own
+    amplitude there; between two lines it shows at least 85 % of it.
+
+    Args:
+        title: of the network.
+        name: of the quantity.
+        unit: of the amplitudes.
+        frequencies: (k,) Hz, evenly spaced.
+        amplitudes: (k,) of a sine, half of its peak-to-peak value.
+    """
+
+    title: str
+    name: str
+    unit: str
+    frequencies: Array
+    amplitudes: Array
+
+    @property
+    def peaks(self) -> tuple[tuple[float, float], ...]:
+        """Frequency in Hz and amplitude of the peaks, the largest first."""
+        places, _ = find_peaks(self.amplitudes)
+        ranked = places[np.argsort(-self.amplitudes[places], kind="stable")]
+        return tuple((float(self.frequencies[place]), float(self.amplitudes[place])) for place in ranked)
+
+    def __str__(self) -> str:
+        rows = [[f"{f:.6g}", f"{amplitude:.5g}"] for f, amplitude in self.peaks[:SHOWN]]
+        title = f"{self.name} in '{self.title}': peaks of the spectrum, lines {self.frequencies[1]:.4g} Hz apart"
+        return "\n".join([title, *in_columns([["Hz", self.unit], *rows])])
+
+    __repr__ = __str__
+
+    def plot(self) -> Figure:
+        """The amplitudes over the frequency (extra `plot`)."""
+        figure = new_figure("Spectrum.plot()", 9.0, 4.0, f"{self.name} in {self.title}")
+        axes = figure.subplots()
+        axes.plot(self.frequencies, self.amplitudes, linewidth=1.0)
+        axes.set(xlabel="frequency in Hz", ylabel=f"amplitude in {self.unit}", xlim=(0.0, self.frequencies[-1]))
+        axes.grid(alpha=0.3)
+        return figure
+
+
+def spectrum(
+    reader: Reader, name: str, place: int | None, start: float | None, end: float | None, f_max: float | None
+) -> Spectrum:
+    """The spectrum of a quantity; arguments as of `Solution.spectrum`."""
+    first, last = span_of(reader, start, end)
+    wanted = None if f_max is None else in_si("f_max", f_max, "Hz")
+    if wanted is not None and not 0.0 < wanted * (last - first) < MOST / 4:
+        highest = MOST / 4 / (last - first)
+        raise ParameterError(f"f_max = {wanted:g} Hz must be above 0 and below {highest:g} Hz over {last - first:g} s.")
+    read = reader.quantity(name, number_of(reader, name, place))
+    count = FEWEST
+    while wanted is not None and count < 4 * wanted * (last - first):
+        count *= 2
+    while True:
+        amplitudes = windowed(read(np.linspace(first, last, count, endpoint=False)))
+        powers = amplitudes**2
+        if count >= MOST or powers[int(0.8 * len(powers)) :].sum() <= FOLDED * powers.sum():
+            break
+        count *= 2
+    frequencies = np.arange(len(amplitudes)) / (last - first)
+    inside = slice(None) if wanted is None else frequencies <= wanted
+    return Spectrum(reader.title, name, reader.unit(name), frequencies[inside], amplitudes[inside])
+
+
+def windowed(values: Array) -> Array:
+    """(..., k / 2 + 1) amplitudes of evenly spaced values (..., k), less their mean, under a Hann window."""
+    count = values.shape[-1]
+    window = hann(count, sym=False)
+    mean = (values * window).sum(axis=-1, keepdims=True) / window.sum()
+    lines = np.abs(rfft((values - mean) * window)) * 2.0 / window.sum()
+    return np.asarray(lines, dtype=float)
+
+
+def number_of(reader: Reader, name: str, place: int | None) -> int | None:
+    """The place of a quantity along a part; by default the middle one.
+
+    Raises:
+        ParameterError: there is no such place.
+        SignalError: there is no such quantity.
+    """
+    reader.unit(name)
+    count = len(reader.places(name))
+    if place is not None and place not in range(count):
+        there = f"0 to {count - 1}" if count else "none: it is read at one place"
+        raise ParameterError(f"place = {place!r}: '{name}' of '{reader.title}' has the places {there}.")
+    return place if place is not None else count // 2 if count else None

@@ -1,0 +1,159 @@
+"""The torsional vibration calculation: from a train and its speeds to stresses, limits and barred ranges."""
+
+from __future__ import annotations
+
+import reprlib
+from collections.abc import Callable, Mapping, Sequence
+from difflib import get_close_matches
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from shaftwork.components.mechanics import Spring
+from shaftwork.components.shafts import Shaft
+from shaftwork.core.errors import ParameterError
+from shaftwork.core.parameters import in_si
+from shaftwork.pipeline.arguments import Point, Time, repeated, several
+from shaftwork.pipeline.network import Network, network_of
+from shaftwork.results.observer import Array, array_in_si
+from shaftwork.torsional.barred_ranges import BarredRange, barred_ranges
+from shaftwork.torsional.order_excitations import Misfire
+from shaftwork.torsional.shaft_sections import Section
+from shaftwork.torsional.shaft_vibration import ShaftVibration, worst_along
+from shaftwork.torsional.torsional_result import TorsionalCalculation
+
+if TYPE_CHECKING:
+    from shaftwork.torsional.forced_train import ForcedTrain
+
+NEAREST = 1e-7
+"""Speeds that differ by less than this fraction are one."""
+
+
+def torsional_calculation(
+    net: Network,
+    speeds: Any,
+    *,
+    sections: Sequence[Section] = (),
+    rated: Any = None,
+    misfire: Misfire = None,
+    at: Point | Callable[[float], Point] = None,
+    exact: bool = False,
+    t: Time = None,
+) -> TorsionalCalculation:
+    """Forced torsional vibration of a train over its speed range, by superposition of the orders of its excitations.
+
+    Law: at the steady speed n of the reference shaft, that of the first `HarmonicTorque`, the order k of every torque
+    swings as exp(i k n t). The train is linear about its operating point, and each order passes through it for itself.
+    The waveform over a cycle is their sum, and the vibratory torque is half of its peak to peak. To the given speeds
+    are added those at which an order meets a natural frequency, and some beside each, so that no peak is missed.
+
+    Args:
+        net: the train, with a `HarmonicTorque` for each cylinder, propeller or other torque that swings by the angle.
+        speeds: (n,) rad/s of the reference shaft, ascending and above 0.
+        sections: of shafts at which stresses are looked at; with a design, what is permitted too.
+        rated: maximum continuous speed of the reference shaft, rad/s; needed where a section has a design.
+        misfire: the name of a cylinder without swing, or several; or by name a share of the swing, or the `Harmonics`
+            that it has then (compression without injection).
+        at: the point about which the train swings, as for `Model.linearize`, or a function from the speed to it; by
+            default the whole train turns with the reference shaft.
+        exact: every shaft but a rigid one and one spring is taken as it is, without a mesh.
+        t: time at which laws are read, s.
+
+    Raises:
+        ParameterError: there is no harmonic torque, or an argument is not what it must be; says what would be.
+        NetworkError: the network cannot be assembled; lists every reason.
+    """
+    from shaftwork.torsional.forced_train import forced_train
+
+    given = _ascending(speeds)
+    train = forced_train(network_of(net), misfire, at, exact=exact, t=t)
+    shafts = _torques_of(train.network)
+    known = _completed(several("sections", sections), net, shafts)
+    top = None if rated is None else in_si("rated", rated, "rad/s", above=0)
+    if top is None and (bare := [one.shaft for one in known.values() if one.design is not None]):
+        raise ParameterError(
+            f"The section of '{bare[0]}' has a design, whose permitted stress depends on the rated speed. Give rated=, "
+            "the maximum continuous speed in rad/s."
+        )
+    resonances = train.resonances(given)
+    n = _refined(given, [(one.speed, one.damping) for one in resonances])
+    amplitudes = train.amplitudes(n, tuple(shafts.values()))
+    vibrations = {}
+    for shaft, torque in shafts.items():
+        torques, places = worst_along(amplitudes[torque], train.orders, train.places(torque))
+        section = known.get(shaft)
+        limits = None if section is None or section.design is None or top is None else section.permitted(n / top)
+        vibration = ShaftVibration(shaft, n, train.orders, torques, places, section, limits)
+        if limits is not None and top is not None:
+            barred = _barred(vibration, train, torque, top)
+            vibration = ShaftVibration(shaft, n, train.orders, torques, places, section, limits, barred)
+        vibrations[shaft] = vibration
+    failing = tuple(one.source.name for one in train.excitations if one.changed)
+    return TorsionalCalculation(net.name, n, train.orders, vibrations, resonances, top, failing, train, shafts)
+
+
+def _ascending(speeds: Any) -> Array:
+    n = array_in_si("speeds", speeds, "rad/s")
+    if len(n) < 2 or not (np.isfinite(n).all() and n[0] > 0 and (np.diff(n) > 0).all()):
+        raise ParameterError(
+            f"speeds = {reprlib.repr(speeds)} must be two or more speeds in rad/s, ascending and above 0, such as "
+            "numpy.linspace(20, 160, 71)."
+        )
+    return n
+
+
+def _torques_of(net: Network) -> dict[str, str]:
+    """From the name of every spring and shaft to its torque."""
+    shafts = {part.name: f"{part.name}.tau" for part in net.parts if isinstance(part, Spring | Shaft)}
+    if not shafts:
+        raise ParameterError(f"'{net.name}' has no Spring or Shaft that could vibrate. Add one between its inertias.")
+    return shafts
+
+
+def _completed(sections: Sequence[Any], net: Network, shafts: Mapping[str, str]) -> dict[str, Section]:
+    """Sections by their shaft, with diameters and bores of shafts where they were left out.
+
+    Raises:
+        ParameterError: one is no section, of no shaft, without a diameter, or of a shaft that has one.
+    """
+    if wrong := [one for one in sections if not isinstance(one, Section)]:
+        raise ParameterError(f"sections: {reprlib.repr(wrong[0])} is no section. Write Section('shaft', diameter=0.2).")
+    if twice := repeated(one.shaft for one in sections):
+        raise ParameterError(f"sections: '{twice}' has two. Give one, or calculate again with the other.")
+    parts = {part.name: part for part in net.parts}
+    completed = {}
+    for one in sections:
+        if one.shaft not in shafts:
+            close = get_close_matches(one.shaft, shafts, n=3) or tuple(shafts)[:12]
+            raise ParameterError(f"sections: '{one.shaft}' is no spring or shaft here. There are: {', '.join(close)}.")
+        part = parts[one.shaft]
+        if isinstance(part, Shaft):
+            diameter, bore = in_si("diameter", part.diameter, "m"), in_si("bore", part.inner_diameter, "m")
+            completed[one.shaft] = one.of(diameter, bore)
+        elif one.diameter is None:
+            raise ParameterError(f"sections: '{one.shaft}' is a spring, which has no diameter. Give diameter= in m.")
+        else:
+            completed[one.shaft] = one.of(one.diameter, 0.0)
+    return completed
+
+
+def _refined(speeds: Array, resonances: Sequence[tuple[float, float]]) -> Array:
+    """The speeds with those of resonances, and some beside each by its damping."""
+    from shaftwork.torsional.forced_train import SPREAD
+
+    beside = [speed * (1 + damping * step) for speed, damping in resonances for step in (SPREAD if damping else (0.0,))]
+    n = np.unique(np.concatenate([speeds, [speed for speed in beside if speeds[0] <= speed <= speeds[-1]]]))
+    return np.asarray(n[np.concatenate([[True], np.diff(n) > NEAREST * n[1:]])])
+
+
+def _barred(vibration: ShaftVibration, train: ForcedTrain, torque: str, rated: float) -> tuple[BarredRange, ...]:
+    section, limits = vibration.section, vibration.limits
+    assert section is not None and limits is not None  # noqa: S101, PT018 (asked before)
+
+    def above(speed: float) -> float:
+        one = np.array([speed])
+        torques, _ = worst_along(train.amplitudes(one, (torque,))[torque], train.orders, train.places(torque))
+        stress = ShaftVibration(vibration.shaft, one, train.orders, torques, None, section, None).stress
+        return float(stress[0] - section.permitted(speed / rated)[0])
+
+    return barred_ranges(vibration.speeds, vibration.stress, limits, above, rated)

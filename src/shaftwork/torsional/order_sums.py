@@ -1,0 +1,102 @@
+"""Sums of orders: how far a quantity swings over a whole cycle when each order is a complex amplitude."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shaftwork.results.observer import Array, Complex, blocks
+
+LARGEST_CYCLE = 120
+"""Turns after which a cycle begins again, at most: teeth of 20 and 24 with half orders need so many."""
+COMMENSURATE = 1e-9
+"""An order this near a fraction, relatively, is one."""
+OVERSAMPLING = 16
+"""Samples over half a swing of the highest order: peaks between samples are then near enough for Newton's method."""
+PEAKS, POLISHED = 4, 5
+"""Highest samples of a waveform that are refined, as two peaks may be nearly alike, and steps of Newton's method."""
+
+
+def cycle_of(orders: Sequence[float]) -> int | None:
+    """The turns after which orders begin again together; None where they have no such cycle below 120 turns."""
+    turns = 1
+    for order in orders:
+        fraction = Fraction(order).limit_denominator(LARGEST_CYCLE)
+        if abs(float(fraction) - order) > COMMENSURATE * order:
+            return None
+        turns = math.lcm(turns, fraction.denominator)
+        if turns > LARGEST_CYCLE:
+            return None
+    return turns
+
+
+def half_range(parts: Complex, orders: Sequence[float]) -> Array:
+    """Half of peak to peak of sum_k Re(parts_k exp(i k phi)) over a cycle, for each row.
+
+    Orders without a common cycle, as behind gears whose teeth have no common factor, come into every phase in the long
+    run: the half ranges of groups that have a cycle each then add up.
+
+    Args:
+        parts: (n, k) complex amplitudes; a row with an infinite one has no bound.
+        orders: (k,) per turn.
+
+    Returns:
+        (n,).
+    """
+    finite = np.isfinite(parts).all(axis=1)
+    total = np.where(finite, 0.0, np.inf)
+    for base, members in _groups(orders):
+        total[finite] += _half_range(parts[finite][:, members], [orders[k] / base for k in members])
+    return total
+
+
+def waveform(parts: Complex, orders: Sequence[float], phi: Array) -> Array:
+    """The sum over the orders at angles (m,) of the reference shaft: of rows (n, k) of amplitudes (n, m)."""
+    return np.asarray((parts @ np.exp(1j * np.multiply.outer(np.asarray(orders), phi))).real)
+
+
+def _groups(orders: Sequence[float]) -> list[tuple[float, list[int]]]:
+    """Orders that have a common cycle, by their places, with the order whose turns it is counted in."""
+    groups: list[tuple[float, list[int]]] = []
+    for place, order in enumerate(orders):
+        for base, members in groups:
+            if cycle_of([orders[k] / base for k in (*members, place)]) is not None:
+                members.append(place)
+                break
+        else:
+            groups.append((1.0 if cycle_of([order]) is not None else order, [place]))
+    return groups
+
+
+def _half_range(parts: Complex, orders: Sequence[float]) -> Array:
+    """The same for orders that have a common cycle: from samples of it, refined by Newton's method."""
+    turns = cycle_of(orders) or 1
+    harmonics = np.rint(np.asarray(orders) * turns).astype(np.intp)
+    count = 2 * OVERSAMPLING * int(harmonics.max())
+    halves = np.empty(len(parts))
+    for here in blocks(len(parts), 4 * count):
+        spectrum = np.zeros((len(parts[here]), count // 2 + 1), dtype=complex)
+        spectrum[:, harmonics] = parts[here] * (count / 2)
+        samples = np.fft.irfft(spectrum, count, axis=1)
+        halves[here] = (_highest(samples, parts[here], harmonics) + _highest(-samples, -parts[here], harmonics)) / 2
+    return halves
+
+
+def _highest(samples: Array, parts: Complex, harmonics: NDArray[np.intp]) -> Array:
+    """(n,) the highest value of each row, of which equidistant samples (n, m) over a cycle are given."""
+    rising = (samples >= np.roll(samples, 1, axis=1)) & (samples >= np.roll(samples, -1, axis=1))
+    places = np.argsort(np.where(rising, -samples, np.inf), axis=1)[:, :PEAKS]
+    step = 2 * np.pi / samples.shape[1]
+    angle = start = places * step
+    for _ in range(POLISHED):
+        turning = parts[:, None, :] * np.exp(1j * angle[:, :, None] * harmonics)
+        slope, bend = (turning @ (1j * harmonics)).real, -(turning @ harmonics.astype(float) ** 2).real
+        angle = np.clip(
+            angle - np.where(bend < 0, slope / np.where(bend < 0, bend, 1.0), 0.0), start - step, start + step
+        )
+    refined = (parts[:, None, :] * np.exp(1j * angle[:, :, None] * harmonics)).real.sum(axis=2)
+    return np.asarray(np.maximum(samples.max(axis=1), refined.max(axis=1)))

@@ -1,0 +1,284 @@
+"""The record of a torsional calculation: tables, pictures, waveforms, life and power."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from shaftwork.core.errors import ParameterError, SignalError, imported
+from shaftwork.core.notebook import html_table
+from shaftwork.core.parameters import in_si
+from shaftwork.core.screen import counted, in_columns
+from shaftwork.results.fatigue import Damage, SNLine, damage, rainflow
+from shaftwork.results.observer import RPM, Array, Complex
+from shaftwork.torsional.barred_ranges import overlapping
+from shaftwork.torsional.holzer import HolzerTable, holzer_table
+from shaftwork.torsional.order_sums import cycle_of, waveform
+from shaftwork.torsional.shaft_vibration import HEADS, ShaftVibration, worst_along
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from shaftwork.frequency.campbell import Campbell
+    from shaftwork.torsional.forced_train import ForcedTrain, Resonance
+
+POINTS = 64
+"""Points of a waveform over a swing of the highest order."""
+
+
+@dataclass(frozen=True, eq=False)
+class TorsionalCalculation(Mapping[str, ShaftVibration]):
+    """A torsional vibration calculation, by shaft: `calculation["shaft 1"].stress`.
+
+    Args:
+        title: of the network.
+        speeds: (n,) rad/s of the reference shaft: those given, resonances, and some beside each.
+        orders: (k,) excited, per turn of it.
+        shafts: the vibration of every spring and shaft.
+        resonances: where orders meet natural frequencies, by ascending speed.
+        rated: maximum continuous speed, rad/s; None where none was given.
+        misfiring: the cylinders that misfire.
+        train: what is shaken, for further questions.
+        torques: from the name of each shaft to that of its torque.
+    """
+
+    title: str
+    speeds: Array
+    orders: tuple[float, ...]
+    shafts: Mapping[str, ShaftVibration]
+    resonances: tuple[Resonance, ...]
+    rated: float | None
+    misfiring: tuple[str, ...]
+    train: ForcedTrain
+    torques: Mapping[str, str]
+
+    def __getitem__(self, shaft: str) -> ShaftVibration:
+        if shaft not in self.shafts:
+            raise SignalError(
+                f"'{shaft}' is no spring or shaft of '{self.title}'. There are: {', '.join(self.shafts)}."
+            )
+        return self.shafts[shaft]
+
+    def __contains__(self, shaft: object) -> bool:
+        return shaft in self.shafts
+
+    def __iter__(self) -> Any:
+        return iter(self.shafts)
+
+    def __len__(self) -> int:
+        return len(self.shafts)
+
+    @property
+    def heading(self) -> str:
+        """The train, what misfires, the range and how much is in it."""
+        failing = f", {' and '.join(self.misfiring)} misfiring" if self.misfiring else ""
+        return (
+            f"Torsional vibration of '{self.title}'{failing}: {self.speeds[0] * RPM:.5g} to "
+            f"{self.speeds[-1] * RPM:.5g} 1/min, {counted(len(self.orders), 'order')}, "
+            f"{counted(len(self.resonances), 'resonance')}"
+        )
+
+    @property
+    def barred(self) -> tuple[tuple[float, float], ...]:
+        """The speeds that all shafts together bar, (start, end) in rad/s."""
+        return overlapping([one for vibration in self.shafts.values() for one in vibration.barred])
+
+    @property
+    def permitted(self) -> bool | None:
+        """Whether the train may run with its barred ranges; None where no section has a design."""
+        judged = [one.permitted for one in self.shafts.values() if one.permitted is not None]
+        return all(judged) if judged else None
+
+    @property
+    def table(self) -> tuple[tuple[str, ...], ...]:
+        """By shaft: name, largest vibratory torque in kN m, its speed in 1/min, main order, stress, tau_c, verdict."""
+        return tuple(one.row for one in self.shafts.values())
+
+    def __str__(self) -> str:
+        lines = [self.heading, *in_columns([HEADS, *self.table])]
+        lines += [f"{one.shaft}: {barred}" for one in self.shafts.values() for barred in one.barred]
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return str(self)
+
+    def _repr_html_(self) -> str:
+        barred = [f"{one.shaft}: {barred}" for one in self.shafts.values() for barred in one.barred]
+        return html_table(self.heading, HEADS, self.table, "; ".join(barred))
+
+    def orders_of(self, name: str) -> Complex:
+        """(n, k) complex amplitudes of any quantity, "flywheel.omega", in every order; along a shaft (n, k, places).
+
+        Raises:
+            SignalError: there is no such quantity.
+        """
+        return np.asarray(self.train.amplitudes(self.speeds, (name,))[name])
+
+    def waveform(self, name: str, speed: Any) -> tuple[Array, Array]:
+        """A quantity over one cycle at a speed, without its mean.
+
+        Args:
+            name: a shaft, whose torque at its worst place is meant, or any quantity that is not read along a part.
+            speed: of the reference shaft, rad/s.
+
+        Returns:
+            Angles of the reference shaft (m,) from 0 on in rad, and values (m,).
+
+        Raises:
+            SignalError: there is no such quantity.
+            ParameterError: the orders have no common cycle.
+        """
+        parts = self._parts(name, speed)
+        phi = np.linspace(0.0, 2 * np.pi * self._turns, self._points)
+        return phi, waveform(parts[None, :], self.orders, phi)[0]
+
+    @property
+    def _turns(self) -> int:
+        turns = cycle_of(self.orders)
+        if turns is None:
+            raise ParameterError(
+                f"The orders of '{self.title}' have no common cycle, as its gears have odd ratios, so that no waveform "
+                "comes back. Its amplitudes are half ranges over all phases."
+            )
+        return turns
+
+    @property
+    def _points(self) -> int:
+        return int(POINTS * max(self.orders) * self._turns) + 1
+
+    def _parts(self, name: str, speed: Any) -> Complex:
+        """(k,) amplitudes at a speed."""
+        n = np.array([in_si("speed", speed, "rad/s", above=0)])
+        quantity = self.torques.get(name, name)
+        amplitudes = self.train.amplitudes(n, (quantity,))[quantity]
+        if name not in self.torques and amplitudes.ndim > 2:
+            raise SignalError(f"'{name}' is read along a part. Name the shaft, '{name.rpartition('.')[0]}'.")
+        parts = np.asarray(worst_along(amplitudes, self.orders, self.train.places(quantity))[0][0])
+        if not np.isfinite(parts).all():
+            raise ParameterError(f"'{name}' has no bound at {n[0]:g} rad/s: an undamped resonance. Add damping.")
+        return parts
+
+    def damage(self, shaft: str, sn: SNLine, speed: Any, mean: float = 0.0) -> Damage:
+        """What one cycle at a speed takes from the life of a shaft, by Miner's rule; `hours` is the life there.
+
+        The amplitudes of the S-N line are stresses in Pa with the stress concentration of the section where one is
+        given, else torques in N m; see the page of [load cycles](life.md).
+
+        Args:
+            shaft: name.
+            sn: the S-N line.
+            speed: of the reference shaft, rad/s.
+            mean: torque that lasts, N m.
+
+        Raises:
+            SignalError: there is no such shaft.
+            ParameterError: an argument is not what it must be.
+            MissingExtraError: the package rainflow is not installed.
+        """
+        section = self[shaft].section
+        if not isinstance(sn, SNLine):
+            raise ParameterError(f"sn = {sn!r} must be an S-N line, SNLine(amplitude=60e6, cycles=2e6, slope=5).")
+        phi, torque = self.waveform(shaft, speed)
+        # from its highest value on, every cycle of a swing that comes back closes
+        torque = np.roll(torque[:-1], -int(torque[:-1].argmax())) + in_si("mean", mean, "N*m")
+        torque = np.append(torque, torque[0])
+        values = torque if section is None else section.scf * section.stress(torque)
+        times = phi / in_si("speed", speed, "rad/s", above=0)
+        name, unit = (f"{shaft}.tau", "N*m") if section is None else (f"stress of {shaft}", "Pa")
+        cycles = rainflow(lambda t: np.interp(t, times, values), times, title=self.title, name=name, unit=unit)
+        return damage(cycles, sn)
+
+    @cached_property
+    def modes(self) -> HolzerTable:
+        """The modes up to the highest excitation as Holzer tables, about the point of the highest speed."""
+        top = max(self.orders) * float(self.speeds[-1]) / (2 * np.pi)
+        sections = [one.section for one in self.shafts.values() if one.section is not None]
+        found = holzer_table(self.train.modes(float(self.speeds[-1]), top), self.torques, sections)
+        return HolzerTable(found.title, tuple(mode for mode in found.modes if mode.frequency <= top))
+
+    def campbell(self, orders: Any = None, f_max: float | None = None) -> Campbell:
+        """Natural frequencies at the operating point of each speed, with the excited orders.
+
+        Args:
+            orders: to be drawn; by default those that are excited.
+            f_max: highest frequency of interest, Hz.
+
+        Raises:
+            ParameterError: as of `Network.campbell`.
+        """
+        return self.train.campbell(self.speeds, self.orders if orders is None else orders, f_max)
+
+    @cached_property
+    def power_lost(self) -> Mapping[str, Array]:
+        """By part the mean power (n,) in W that it takes out of the vibration; below 0 where it feeds it.
+
+        Law: sum_k Re(conj(tau_k) omega_k) / 2. All parts together take what `power_fed` says.
+        """
+        ports = self.train.ports
+        names = tuple(dict.fromkeys(name for several in ports.values() for port in several for name in port[:2]))
+        read = self.train.amplitudes(self.speeds, names)
+        lost = {}
+        for part, several in ports.items():
+            power = sum((_mean_power(read[port.through], read[port.across], port.sign) for port in several), 0.0)
+            lost[part] = np.broadcast_to(np.asarray(power, dtype=float), self.speeds.shape)
+        for name, fed in self.power_fed.items():
+            lost[name] = lost[name] + fed
+        return lost
+
+    @cached_property
+    def power_fed(self) -> Mapping[str, Array]:
+        """By excitation the mean power (n,) in W that it feeds into the vibration."""
+        from shaftwork.torsional.order_excitations import amplitudes_of
+
+        excitations = self.train.excitations
+        table = amplitudes_of(excitations, self.orders, self.speeds)
+        speeds = {one.source.name: self.train.ports[one.source.name][0].across for one in excitations}
+        read = self.train.amplitudes(self.speeds, tuple(speeds.values()))
+        return {
+            name: _mean_power(torques, read[speed], 1.0)
+            for (name, speed), torques in zip(speeds.items(), table, strict=True)
+        }
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A row for each shaft and speed: torques in N m, stresses and limits in Pa (extra `data`).
+
+        Raises:
+            MissingExtraError: pandas is not installed.
+        """
+        frames: type[pd.DataFrame] = imported("pandas", "data", "TorsionalCalculation.to_pandas()").DataFrame
+        rows = []
+        for one in self.shafts.values():
+            columns: dict[str, Any] = {"shaft": one.shaft, "speed": self.speeds, "n": self.speeds * RPM}
+            columns |= {"torque": one.amplitude, "arithmetic": one.arithmetic}
+            if one.section is not None:
+                columns |= {"stress": one.stress, "notch_stress": one.notch_stress}
+            if one.limits is not None:
+                columns |= dict(zip(("tau_c", "tau_t"), one.limits, strict=True))
+            rows += frames(columns).to_dict("records")
+        return frames(rows)
+
+    def plot(self, *shafts: str) -> Figure:
+        """Vibratory stress (or torque, without a section) over speed with its largest orders and limits (extra `plot`).
+
+        Args:
+            *shafts: names; by default those with a section, or else all.
+
+        Raises:
+            SignalError: there is no such shaft.
+            MissingExtraError: matplotlib is not installed.
+        """
+        from shaftwork.torsional.torsional_pictures import picture
+
+        named = shafts or tuple(name for name, one in self.shafts.items() if one.section is not None)
+        return picture(self.heading, [self[name] for name in named or tuple(self.shafts)])
+
+
+def _mean_power(through: Complex, across: Complex, sign: float) -> Array:
+    """(n,) over a cycle, in W; of orders without a bound infinite."""
+    parts = np.where(np.isfinite(through) & np.isfinite(across), sign * (np.conj(through) * across).real / 2, np.inf)
+    return np.asarray(parts.sum(axis=1))

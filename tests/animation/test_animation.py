@@ -1,0 +1,106 @@
+"""Moving pictures show true angles, slowed and enlarged by the factors that they name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import shaftwork as sw
+from shaftwork.animation.turning import turning
+from tests.reporting.test_reports import LOADED
+
+
+def geared() -> sw.Solution:
+    """Two discs on a shaft, and a third one behind a gear, with all angles recorded."""
+    net = sw.Network("geared")
+    net.add(sw.TorqueSource("motor", tau=10.0), "rotor")
+    net.add(sw.Inertia("J1", J=2.0), "rotor")
+    net.add(sw.Spring("shaft", c=1e3, d=1.0), "rotor", "pinion")
+    net.add(sw.Inertia("J2", J=1.0), "pinion")
+    net.add(sw.Gear("gear", ratio=3.0), "pinion", "wheel")
+    net.add(sw.Inertia("J3", J=4.0), "wheel")
+    return net.compile(angles=["J1", "J2", "J3"]).simulate(4.0, rtol=1e-10)
+
+
+def test_angles_are_those_of_the_motion_slowed_and_twists_enlarged() -> None:
+    solution = geared()
+    times = np.linspace(0.0, 4.0, 81)
+    shown = turning(solution.reader, times, 4.0)
+    assert shown.discs == ("rotor", "pinion", "wheel")
+    true = np.column_stack([solution.at(times)[f"{name}.phi"] for name in ("J1", "J2", "J3")])
+    mean = true[:, :2].mean(axis=1)
+    scale = np.abs(true).max()
+    expected = mean / shown.slowed + shown.enlarged * (true[:, 0] - mean)
+    np.testing.assert_allclose(shown.angles[:, 0], expected, atol=1e-6 * shown.enlarged * scale)  # of the integral
+    np.testing.assert_allclose(shown.angles[:, 2], true[:, 2] / shown.slowed, atol=1e-6 * scale)
+    twist = shown.angles[:, 0] - shown.angles[:, 1]
+    np.testing.assert_allclose(twist, shown.enlarged * solution.at(times)["shaft.phi_rel"], atol=1e-5 * shown.enlarged)
+    assert np.abs(twist).max() == pytest.approx(np.pi / 3, rel=1e-6)  # both discs a sixth of pi from their mean
+    assert shown.joints == ((0, 1, "shaft.tau"),)
+
+
+def test_nothing_turns_faster_than_the_eye_can_follow() -> None:
+    shown = turning(geared().reader, np.linspace(0.0, 4.0, 81), 4.0)
+    mean = shown.angles[:, :2].mean(axis=1)
+    assert np.abs(np.diff(mean)).max() <= np.pi * 4.0 / 81 * (1 + 1e-9)
+
+
+def test_files_hold_every_picture(tmp_path: Path) -> None:
+    moving = geared().animate("shaft.tau", seconds=0.5)
+    moving.save(tmp_path / "train.gif")
+    with Image.open(tmp_path / "train.gif") as gif:
+        assert gif.n_frames == moving.count == 10
+    moving.save(tmp_path / "train.html")
+    page = (tmp_path / "train.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png;base64") == 10
+    assert LOADED.findall(page) == []
+
+
+def test_a_mode_swings_with_its_shape() -> None:
+    modes = sw.scenes.crane_train().modes()
+    moving = modes.animate(2, seconds=2.0)
+    spokes = moving.figure.axes[0].lines
+    at_rest, turned = (_angles(moving, spokes, number) for number in (10, 0))
+    names = [text.get_text() for text in moving.figure.axes[0].texts]
+    shapes = np.array([modes.shapes[f"{name}.omega"][2].real for name in names])
+    np.testing.assert_allclose(turned, np.pi / 4 * shapes / np.abs(shapes).max(), atol=1e-6)  # of complex shapes
+    assert np.abs(at_rest).max() < np.abs(turned).max()
+    with pytest.raises(sw.ParameterError, match="There is no mode 99"):
+        modes.animate(99)
+
+
+def _angles(moving: object, spokes: object, number: int) -> np.ndarray:
+    moving.draw(number)  # type: ignore[attr-defined]
+    ends = [(line.get_xdata(), line.get_ydata()) for line in spokes]  # type: ignore[attr-defined]
+    return np.array([np.arcsin((x[1] - x[0]) / 0.8) for x, _ in ends])
+
+
+def test_what_cannot_be_shown_is_refused(tmp_path: Path) -> None:
+    solution = geared()
+    with pytest.raises(sw.ParameterError, match="seconds"):
+        solution.animate(seconds=1e6)
+    with pytest.raises(sw.ParameterError, match=r"no \'\.avi\'"):
+        solution.animate(seconds=0.5).save(tmp_path / "train.avi")
+    net = sw.Network("hoist")
+    net.add(sw.ForceSource("weight", f=-1.0), "hook")
+    net.add(sw.Mass("load", m=1.0), "hook")
+    with pytest.raises(sw.ParameterError, match="Nothing in 'hoist' rotates"):
+        net.simulate(1.0).animate()
+    with pytest.raises(sw.ParameterError, match="nothing rotates"):
+        net.modes().animate(0)
+
+
+@pytest.mark.parametrize("made", ["solution", "modes", "sweep"])
+def test_notebooks_show_tables_and_no_markup_of_names(made: str) -> None:
+    net = sw.Network("a <b> & c")
+    net.add(sw.TorqueSource("motor", tau=1.0), "rotor")
+    net.add(sw.Inertia("J", J=1.0), "rotor")
+    shown = {
+        "solution": lambda: net.simulate(1.0),
+        "modes": net.modes,
+        "sweep": lambda: sw.studies.sweep(net, {"J.J": [1.0, 2.0]}, t_end=1.0, measures=["max J.omega"]),
+    }[made]()
+    assert "a &lt;b&gt; &amp; c" in shown._repr_html_()
