@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from shaftwork.core.domains import Domain
 from shaftwork.core.errors import ParameterError, SignalError
+from shaftwork.core.parameters import in_si
 from shaftwork.network.netlist import Netlist
 from shaftwork.results.solution import Solution
 
@@ -71,7 +72,7 @@ class Analogy:
                     f"'{name}' is {words} in '{self.netlist.name}'. Give speeds of inertias and twists of springs."
                 )
             ((other, factor),) = terms.items()
-            starts[other] = float(value) / factor
+            starts[other] = in_si(name, value) / factor
         return starts
 
     def _sum(self, name: str) -> Mapping[str, float]:

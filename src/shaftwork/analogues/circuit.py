@@ -54,6 +54,7 @@ class _Circuit:
     def __init__(self, netlist: Netlist, form: StateForm) -> None:
         self._netlist, self._form, self._graph = netlist, form, form.graph
         self._names = ElementNames(form.graph)
+        self._node_of = {name: self._names.node(number) for number, name in enumerate(form.graph.nodes)}
         self._edges: dict[Edge, EdgeReading] = {}
         self._renamed: list[GraphPart] = []
         self.branches: dict[str, int] = {}
@@ -71,8 +72,12 @@ class _Circuit:
             return
         self._renamed.append(part)
         electrical = image_class(type(component)) is type(component)
-        nodes = (*item.nodes, *(REFERENCE for _ in component.ports[len(item.nodes) :]))
-        yield item if electrical else dataclasses.replace(item, part=image_of(component), nodes=nodes, origin=None)
+        there = (self._node_of.get(node, node) for node in item.nodes)
+        nodes = (*there, *(REFERENCE for _ in component.ports[len(item.nodes) :]))
+        if electrical:
+            yield dataclasses.replace(item, nodes=nodes)
+        else:
+            yield dataclasses.replace(item, part=image_of(component), nodes=nodes, origin=None)
 
     def _is_elementary(self, part: GraphPart) -> bool:
         """Whether elements of a circuit can stand for a part: one that is no circuit itself and no mesh."""
@@ -102,9 +107,11 @@ class _Circuit:
         """What each quantity of the network is in the circuit."""
         names = Names(self._form)
         graph = self._graph
-        inside = {node for part in self._renamed for node in part.nodes.values()}  # they are where they were
+        owners = {part.name for part in self._renamed}  # nodes inside them keep their names
         nodes: dict[int, Sum] = {
-            number: {f"{name if number in inside else self._names.node(number)}.{ELECTRICAL.across.name}": 1.0}
+            number: {
+                f"{name if name.rpartition('.')[0] in owners else self._node_of[name]}.{ELECTRICAL.across.name}": 1.0
+            }
             for number, name in enumerate(graph.nodes)
         }
         quantities = Readings(self._form, self._edges, nodes).quantities()
@@ -170,8 +177,9 @@ def _made(element: Element) -> Component:
             return CurrentSource(name, symbol=symbol, i=-_in_circuit(value))
         case Kind.COUPLING if len(element.terms) == 2:
             return Transformer(name, symbol=symbol, ratio=-element.terms[1] / element.terms[0])
-        case _:
+        case Kind.COUPLING if len(element.terms) == 1:
             return Resistor(name, symbol=symbol, R=0.0)
+    raise AssertionError(f"{element.kind} of '{name}' has no element of a circuit")  # pragma: no cover
 
 
 def _in_circuit(value: Any) -> Any:

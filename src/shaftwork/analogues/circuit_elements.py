@@ -53,6 +53,8 @@ class ElementNames:
     def __init__(self, graph: CircuitGraph) -> None:
         self._graph = graph
         self._taken = {part.name for part in graph.parts}  # only asked for membership
+        # a spring has omega_rel beside the omega of a node of its name; in a circuit both are u
+        self._elsewhere = {part.name: {*part.nodes.values()} - {GROUND} for part in graph.parts}
 
     def node(self, number: int) -> str:
         """The name of a node; one inside a part loses its dot, which marks those alone."""
@@ -60,7 +62,9 @@ class ElementNames:
             return REFERENCE
         name = self._graph.nodes[number]
         owner, _, inner = name.rpartition(".")
-        return f"{owner} {inner}" if owner in self._taken else name
+        if owner in self._taken:
+            return f"{owner} {inner}"
+        return f"{name} node" if self._elsewhere.get(name, {number}) != {number} else name
 
     def of_branches(self, part: GraphPart, kept: int) -> Iterator[str]:
         """A name for each branch of a part: its own for one of them, with the letter of the law behind it for others.
