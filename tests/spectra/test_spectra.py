@@ -93,3 +93,35 @@ def test_what_means_nothing_is_refused() -> None:
         turning.spectrum("ripple.tau", f_max=-1.0)
     with pytest.raises(sw.SignalError, match="ripple"):
         turning.spectrum("ripple.taus")
+
+
+@pytest.mark.parametrize("seconds", [2.0, pytest.param(30.0, marks=pytest.mark.slow)])
+def test_a_fast_swing_appears_at_its_own_frequency_however_long_the_span(seconds: float) -> None:
+    """Samples that are too few would show it at another one, with its full amplitude."""
+    net = sw.Network("fast")
+    net.add(sw.TorqueSource("motor", tau=1.0), "a")
+    net.add(sw.Inertia("J1", J=1e-3), "a")
+    net.add(sw.Spring("shaft", c=1e5), "a", "b")
+    net.add(sw.Inertia("J2", J=1e-3), "b")
+    frequency = net.modes().frequencies[-1]
+    (largest, _), *_ = net.simulate(seconds).spectrum("shaft.tau").peaks
+    assert largest == pytest.approx(frequency, abs=1.0 / seconds)  # a line of the spectrum
+
+
+@pytest.mark.slow
+def test_what_no_sampling_shows_is_said() -> None:
+    with pytest.warns(sw.AccuracyWarning, match="still changes by"):
+        swinging_fast().spectrum("motor.tau")
+
+
+def swinging_fast() -> sw.Solution:
+    """A torque of 1 MHz over a second."""
+    net = sw.Network("fast")
+    net.add(sw.TorqueSource("motor", tau=sympy.sin(2 * sympy.pi * 1000003 * sw.t)), "rotor")
+    net.add(sw.Inertia("J", J=2.0), "rotor")
+    return net.simulate(1.0, t_eval=[0.0, 1.0])
+
+
+def test_an_order_that_is_not_there_is_refused() -> None:
+    with pytest.raises(sw.ParameterError, match=r"must be from 0 to 8, the highest order"):
+        rising().order_spectra("ripple.tau", "J.omega", turns=4, order_max=8).order(1000.0)

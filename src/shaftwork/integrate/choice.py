@@ -194,10 +194,11 @@ def load(name: str) -> Engine:
             from shaftwork.integrate.collocation import banded
 
             return banded.solve
-        case _:
+        case "scipy" | "scipy-radau":
             from shaftwork.integrate import scipy_ivp
 
             return partial(scipy_ivp.solve, method="DOP853" if name == "scipy" else "Radau")
+    raise AssertionError(f"engine {name!r} of ENGINES is not loaded here")
 
 
 def _stiff(problem: Problem, *, compiled: bool) -> tuple[str, str] | None:

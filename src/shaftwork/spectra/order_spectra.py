@@ -14,7 +14,7 @@ from shaftwork.core.parameters import in_si
 from shaftwork.core.screen import in_columns
 from shaftwork.results.observer import RPM, Array, Reader, span_of
 from shaftwork.results.plotting import new_figure
-from shaftwork.spectra.spectrum import number_of, windowed
+from shaftwork.spectra.spectrum import MOST, number_of, refined, windowed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,8 +22,7 @@ if TYPE_CHECKING:
 SAMPLES = 20_001
 """Of the speed, from which the angle is integrated."""
 OVERSAMPLED = 4
-"""Samples per turn, as multiples of the highest order: twice what the sampling theorem needs, so that what lies above
-the highest order is not taken for one below it."""
+"""Samples per turn to begin with, as multiples of the highest order: twice what the sampling theorem needs."""
 SHOWN = 10
 """Rows in the table."""
 
@@ -56,7 +55,13 @@ class OrderSpectra:
     amplitudes: Array
 
     def order(self, number: float) -> Array:
-        """(s,) amplitudes of the line next to an order, over the stretches."""
+        """(s,) amplitudes of the line next to an order, over the stretches.
+
+        Raises:
+            ParameterError: there is no such order in the spectra.
+        """
+        if not 0.0 <= number <= self.orders[-1]:
+            raise ParameterError(f"order = {number!r} must be from 0 to {self.orders[-1]:g}, the highest order here.")
         return np.asarray(self.amplitudes[:, int(np.argmin(np.abs(self.orders - number)))])
 
     def __str__(self) -> str:
@@ -110,20 +115,25 @@ def order_spectra(
             "and end= of a span in which it turns one way."
         )
     angles = np.abs(cumulative_simpson(speeds, x=times, initial=0.0)) / (2.0 * np.pi)
-    per_turn = int(np.ceil(OVERSAMPLED * highest))
-    count = int(per_turn * turning)
     starts = np.arange(0.0, angles[-1] - turning, turning / 2.0)
     if not starts.size:
         total = f"'{speed}' makes {angles[-1]:.4g} turns from {first:g} to {last:g} s"
         raise ParameterError(f"turns = {turning:g}: {total}. Take fewer turns.")
     when = PchipInterpolator(angles, times)
-    at = when(starts[:, None] + np.arange(count) / per_turn)
-    values = reader.quantity(name, number_of(reader, name, place))(at.ravel()).reshape(at.shape)
-    amplitudes = windowed(values)
-    orders = np.arange(amplitudes.shape[1]) * per_turn / count
+    read = reader.quantity(name, number_of(reader, name, place))
+
+    def sampled(count: int) -> Array:
+        at = when(starts[:, None] + turning / count * np.arange(count))
+        return windowed(read(at.ravel()).reshape(at.shape))
+
+    fewest = int(np.ceil(OVERSAMPLED * highest * turning))
+    most = max(fewest, MOST // len(starts))
+    amplitudes = refined(sampled, fewest, most, f"the order spectra of '{name}' over {turning:g} turns")
+    orders = np.arange(amplitudes.shape[1]) / turning
     inside = orders <= highest
     ends = when(starts + turning)
-    mean = 2.0 * np.pi * turning / (ends - at[:, 0]) * np.sign(speeds.sum())
-    middle = (ends + at[:, 0]) / 2.0
+    begins = when(starts)
+    mean = 2.0 * np.pi * turning / (ends - begins) * np.sign(speeds.sum())
+    middle = (ends + begins) / 2.0
     unit = reader.unit(name)
     return OrderSpectra(reader.title, name, unit, speed, orders[inside], mean, middle, amplitudes[:, inside])

@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.fft import rfft
+from scipy.fft import next_fast_len, rfft
 from scipy.signal import find_peaks
 from scipy.signal.windows import hann
 
-from shaftwork.core.errors import ParameterError
+from shaftwork.core.errors import AccuracyWarning, ParameterError
+from shaftwork.core.notices import warn
 from shaftwork.core.parameters import in_si
 from shaftwork.core.screen import in_columns
+from shaftwork.numerics.tolerances import GOLDEN
 from shaftwork.results.observer import Array, Reader, span_of
 from shaftwork.results.plotting import new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FEWEST, MOST = 2**12, 2**18
+FEWEST, MOST = 2**12, 2**20
 """Samples of a span."""
-FOLDED = 1e-4
-"""Share of the power above 0.8 of the highest frequency up to which sampling is fine enough: what lies beyond that
-frequency would appear below it."""
+FOLDED = 1e-3
+"""Of the largest amplitude: by how much more samples may change the others. What swings too fast for samples appears at
+a frequency that it does not have, and at another one with more of them."""
 SHOWN = 10
 """Peaks in the table."""
 
@@ -83,18 +86,46 @@ def spectrum(
         highest = MOST / 4 / (last - first)
         raise ParameterError(f"f_max = {wanted:g} Hz must be above 0 and below {highest:g} Hz over {last - first:g} s.")
     read = reader.quantity(name, number_of(reader, name, place))
-    count = FEWEST
-    while wanted is not None and count < 4 * wanted * (last - first):
-        count *= 2
-    while True:
-        amplitudes = windowed(read(np.linspace(first, last, count, endpoint=False)))
-        powers = amplitudes**2
-        if count >= MOST or powers[int(0.8 * len(powers)) :].sum() <= FOLDED * powers.sum():
-            break
-        count *= 2
+
+    def sampled(count: int) -> Array:
+        return windowed(read(np.linspace(first, last, count, endpoint=False)))
+
+    fewest = FEWEST if wanted is None else max(FEWEST, int(4 * wanted * (last - first)))
+    amplitudes = refined(sampled, fewest, MOST, f"the spectrum of '{name}' over {last - first:g} s")
     frequencies = np.arange(len(amplitudes)) / (last - first)
     inside = slice(None) if wanted is None else frequencies <= wanted
     return Spectrum(reader.title, name, reader.unit(name), frequencies[inside], amplitudes[inside])
+
+
+def refined(sampled: Callable[[int], Array], fewest: int, most: int, what: str) -> Array:
+    """Amplitudes (..., k) that more samples do not change: what swings faster than half the samples appears elsewhere.
+
+    Args:
+        sampled: from a number of samples to the amplitudes; more of them give more lines behind the same.
+        fewest: samples to begin with.
+        most: samples at which it ends.
+        what: for the warning.
+
+    Warns:
+        AccuracyWarning: even the most samples change the amplitudes.
+    """
+    amplitudes, count = sampled(fewest), fewest
+    while True:
+        # by the golden section: twice as many samples would often show the same wrong frequency
+        more = next_fast_len(int(count / GOLDEN), real=True)
+        finer = sampled(more)
+        lines = amplitudes.shape[-1] - 1  # without the last one, where both sides of the half fall together
+        off = np.abs(finer[..., :lines] - amplitudes[..., :lines]).max(initial=0.0)
+        fewer, amplitudes, count = count, finer, more
+        if off <= FOLDED * np.abs(finer).max(initial=0.0):
+            return amplitudes
+        if count >= most:
+            warn(
+                f"{what[0].upper()}{what[1:]} still changes by {off:.2g} between {fewer} and {count} samples: the "
+                "quantity jumps, or swings faster than these can show. Take a shorter span.",
+                AccuracyWarning,
+            )
+            return amplitudes
 
 
 def windowed(values: Array) -> Array:
