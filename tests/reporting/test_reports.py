@@ -98,6 +98,17 @@ def test_what_cannot_be_computed_stands_among_the_assumptions() -> None:
     assert "Motion" not in dict(report.sections)
 
 
+def test_what_is_wanted_and_cannot_be_drawn_is_said() -> None:
+    net = sw.Network("long")
+    for k in range(70):
+        net.add(sw.Inertia(f"J{k}", J=1.0), f"n{k}")
+        net.add(sw.Spring(f"c{k}", c=1.0), f"n{k}", f"n{k + 1}")
+    net.add(sw.Inertia("last", J=1.0), "n70")
+    ((heading, text),) = sw.report(net, sections=["drawing"]).sections
+    assert heading == "Left out"
+    assert "Drawings of more than" in text
+
+
 def test_where_values_come_from_is_a_column() -> None:
     parts = sw.report(
         sw.scenes.crane_start(), origins={"J1.J": "drawing 4711", "shaft": "catalogue"}, sections=["parts"]

@@ -282,3 +282,5 @@ def _written(about: Subject, words: Mapping[str, str], wanted: Sequence[str]) ->
             yield conclusions.capitalize(), said[conclusions]
         if text := paragraphs(said.get(name, ""), written[name]):
             yield heading, text
+    if about.notes and WRITTEN_LAST not in wanted:
+        yield "Left out", listed(dict.fromkeys(about.notes))

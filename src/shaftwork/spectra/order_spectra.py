@@ -109,7 +109,8 @@ def order_spectra(
         raise ParameterError(f"turns = {turns!r}, order_max = {order_max!r}: both above 0, order_max above 1 / turns.")
     times = np.linspace(first, last, SAMPLES)
     speeds = reader.quantity(speed)(times)
-    if (wrong := speeds * np.sign(speeds[len(speeds) // 100]) <= 0.0).any():
+    way = np.sign(speeds[len(speeds) // 100])  # shortly after the start, which may be a standstill
+    if (wrong := speeds * way <= 0.0).any():
         raise ParameterError(
             f"'{speed}' stands or turns back at t = {times[wrong][0]:.4g} s, where orders mean nothing. Give start= "
             "and end= of a span in which it turns one way."

@@ -109,8 +109,8 @@ def _is_peak(stress: Array, places: NDArray[np.intp]) -> NDArray[np.bool_]:
 def _merged(ranges: Sequence[BarredRange]) -> list[BarredRange]:
     """Ranges that overlap, as one."""
     merged: list[BarredRange] = []
-    for one in ranges:
-        if merged and one.start <= merged[-1].end:
+    for one in sorted(ranges, key=lambda each: each.start):
+        while merged and one.start <= merged[-1].end:
             last = merged.pop()
             one = BarredRange(  # noqa: PLW2901 (the joined range)
                 min(last.start, one.start),
