@@ -7,7 +7,9 @@ import shutil
 import subprocess
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 import shaftwork as sw
@@ -83,6 +85,54 @@ def test_every_phase_that_is_printed_has_its_states() -> None:
 
 def test_words_of_the_user_are_markdown(crane: sw.Report) -> None:
     assert crane.sections[0] == ("Introduction", "It \\emph{travels}.\n")
+
+
+def test_no_number_of_a_table_is_lost_on_the_page() -> None:
+    words = "|length|count|\n|---|---|\n|200 mm|4|\n|7|8|\n\nin C:\\dir\\new\n"
+    calculation = sw.torsional_calculation(sw.scenes.ship_engine(), np.array([20.0, 60.0, 90.0]))
+    report = sw.report(
+        sw.scenes.ship_engine(), torsional=calculation, sections=["torsional"], text={"introduction": words}
+    )
+    shown = " ".join(" ".join(_Text(report.html).words).split())
+    for cell in ("200 mm 4", "7 8", r"C:\dir\new", *(" ".join(row[:4]) for row in calculation.table)):
+        assert cell in shown
+
+
+def test_names_of_any_signs_are_in_the_document(tmp_path: Path) -> None:
+    net = sw.Network("braces { and <b>")
+    net.add(sw.TorqueSource("m", tau=1.0), "a")
+    net.add(sw.Inertia("a{b", J=1.0), "a")
+    net.add(sw.Spring('6" disc', c=100.0, d=1.0), "a", "b")
+    net.add(sw.Inertia("100 % #1", J=1.0), "b")
+    report = sw.report(net, t_end=1.0)
+    report.save(tmp_path / "report.pdf")
+    words = " ".join(_Text(report.html).words)
+    assert all(name in words for name in ("a{b", "100 % #1", "braces { and <b>"))
+    assert "\\mathrm" not in words.partition("Model file")[0]  # every formula is one
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"autor": "x"}, r"there is no 'autor'\. There are: signals"),
+        ({"references": "Smith 1999"}, r"must be a list of texts, such as \['Smith 1999'\]"),
+        ({"solution": "other"}, r"of another network than 'crane start': 'J1\.J' has another value"),
+        ({"solution": "same", "t_end": 5.0}, "Leave out one of them"),
+    ],
+)
+def test_what_would_be_dropped_without_a_word_is_refused(given: dict[str, Any], said: str) -> None:
+    net, other = sw.scenes.crane_start(), sw.scenes.crane_start()
+    other.replace(sw.Inertia("J1", J=5.0, symbol="1"))
+    motions = {"same": net, "other": other}
+    if "solution" in given:
+        given = given | {"solution": motions[given["solution"]].simulate(0.1)}
+    with pytest.raises(sw.ParameterError, match=said):
+        sw.report(net, **given)
+
+
+def test_an_origin_of_nothing_is_refused() -> None:
+    with pytest.raises(sw.ParameterError, match=r"origins: there is no part or parameter 'J1\.j'. There are: J1\.J"):
+        sw.report(sw.scenes.crane_start(), origins={"J1.j": "drawing"})
 
 
 def test_what_cannot_be_computed_stands_among_the_assumptions() -> None:

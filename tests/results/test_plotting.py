@@ -99,3 +99,13 @@ def test_a_quantity_along_a_shaft_is_drawn_at_all_its_places() -> None:
     places = len(sol.places["line.tau"])
     assert labels(axis) == [f"line.tau at {places} places", "line.tau_a"]
     assert len(axis.lines) == places + 1
+
+
+def test_a_name_with_dollars_is_no_formula() -> None:
+    net = sw.Network(r"money $\b$")
+    net.add(sw.TorqueSource("motor", tau=1.0), "a")
+    net.add(sw.Inertia(r"a$\b$", J=1.0), "a")
+    solution = net.simulate(1.0)
+    solution.plot().savefig(io.BytesIO())
+    solution.animate(seconds=0.2).figure.savefig(io.BytesIO())
+    solution.spectrum(r"a$\b$.omega").plot().savefig(io.BytesIO())

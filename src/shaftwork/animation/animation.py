@@ -18,7 +18,7 @@ from shaftwork.animation.turning import turning
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
 from shaftwork.results.observer import Array, PhaseRow, Reader
-from shaftwork.results.plotting import curve, new_figure
+from shaftwork.results.plotting import curve, new_figure, plain
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -135,7 +135,7 @@ def animate(
     torques = np.column_stack([reader.quantity(name)(times) for _, _, name in discs.joints] or [np.zeros((count, 0))])
     largest = np.abs(torques).max(initial=np.finfo(float).tiny)
     for name in names:
-        below.plot(*curve(reader, name), linewidth=1.0, label=f"{name} in {reader.unit(name)}")
+        below.plot(*curve(reader, name), linewidth=1.0, label=plain(f"{name} in {reader.unit(name)}"))
     below.set(xlim=span, xlabel="t in s")
     below.legend(loc="upper right", fontsize="small")
     cursor = below.axvline(times[0], color="black", linewidth=0.8)
@@ -149,7 +149,7 @@ def animate(
             line.set_color(_colour(torque / largest))
         cursor.set_xdata([t, t])
         phase = next((row.name for row in phases if row.start <= t <= row.end), "")
-        title.set_text("\n".join((f"{reader.title}, t = {t:.3f} s", said, phase)))
+        title.set_text(plain("\n".join((f"{reader.title}, t = {t:.3f} s", said, phase))))
 
     draw(0)
     return Animation(figure, count, draw)
@@ -201,7 +201,7 @@ def draw_discs(axes: Axes, names: Sequence[str]) -> list[Any]:
 
     for number, name in enumerate(names):
         axes.add_patch(Circle((number, 0.0), RADIUS, facecolor="0.85", edgecolor="0.3"))
-        axes.text(number, -RADIUS - 0.12, name, ha="center", va="top", fontsize="small", rotation=20)
+        axes.text(number, -RADIUS - 0.12, plain(name), ha="center", va="top", fontsize="small", rotation=20)
     axes.set(xlim=(-0.6, len(names) - 0.4), ylim=(-1.0, 0.6), aspect="equal")
     axes.set_axis_off()
     return [axes.plot([], [], color="0.1", linewidth=2.0)[0] for _ in names]

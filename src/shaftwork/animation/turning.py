@@ -56,10 +56,12 @@ def turning(reader: Reader, times: Array, shown_seconds: float) -> Turning:
     """
     units, nodes_of = reader.observer.units, reader.observer.nodes_of
     discs: dict[str, str] = {}  # node to part
+    shafts = {name.rpartition(".")[0] for name in reader.observer.profiles}  # long ones, with nodes inside
     for name in units:
         part, _, quantity = name.rpartition(".")
-        if quantity == "omega" and len(nodes_of(name)) == 1:
-            discs.setdefault(nodes_of(name)[0], part)
+        ends = nodes_of(name)
+        if quantity == "omega" and len(ends) == 1 and ends[0].rpartition(".")[0] not in shafts:
+            discs.setdefault(ends[0], part)
     if not discs:
         raise ParameterError(f"Nothing in '{reader.title}' rotates, so there are no discs to show.")
     places = {node: number for number, node in enumerate(discs)}
@@ -67,8 +69,12 @@ def turning(reader: Reader, times: Array, shown_seconds: float) -> Turning:
     for name in units:
         part, _, quantity = name.rpartition(".")
         ends = nodes_of(name)
-        if quantity == "phi_rel" and len(ends) == 2 and all(node in places for node in ends):
-            joints.append((places[ends[0]], places[ends[1]], f"{part}.tau"))
+        if quantity not in ("phi_rel", "tau_a") or (quantity == "tau_a") != (part in shafts):
+            continue
+        if len(ends) == 1:  # a long shaft's torque at an end is read there
+            ends = (*ends, *nodes_of(f"{part}.tau_b"))
+        if len(ends) == 2 and all(node in places for node in ends):
+            joints.append((places[ends[0]], places[ends[1]], name if part in shafts else f"{part}.tau"))
     true = np.column_stack([_angle(reader, f"{part}.omega", times) for part in discs.values()])
     joined = np.zeros((len(discs), len(discs)), dtype=bool)
     for a, b, _ in joints:

@@ -83,7 +83,11 @@ def _lines(letters: Letters, item: Item, branches: Mapping[str, int]) -> tuple[s
         return item.lines
     branch = letters.graph.branches[branches[item.part]]
     part = letters.graph.parts[branch.part]
-    return tuple(letters.of_part(part) if branch.terms else letters.of_branch(branch, part, dual=True))
+    if not branch.terms:
+        return tuple(letters.of_branch(branch, part, dual=True))
+    lines = tuple(letters.of_part(part))
+    letter = lines[0].split(" = ")[0].strip("$") if lines else ""
+    return (f"$1/{letter}$", *(line for line in lines if " = " in line)) if letter else lines
 
 
 def _in_columns(items: Sequence[Item]) -> Iterator[Item]:

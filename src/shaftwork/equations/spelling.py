@@ -9,8 +9,8 @@ INDEX_OPENS, INDEX_CLOSES = "\ue000", "\ue001"
 """Marks around the number at the end of a subscript, to recognise rows that differ by it alone; never printed."""
 ESCAPES = {
     "\\": r"\backslash ",
-    "{": r"\{",
-    "}": r"\}",
+    "{": r"\text{\{}",
+    "}": r"\text{\}}",
     "_": r"\_",
     "%": r"\%",
     "&": r"\&",
@@ -21,6 +21,8 @@ ESCAPES = {
     " ": r"\ ",
     "-": r"\text{-}",
     "'": r"\text{'}",
+    '"': r"\text{''}",
+    "`": r"\text{`}",
     "°": r"{^{\circ}}",
 }
 ACCENTED = "À-ÖØ-öø-ĥĨ-ķĹ-ľŁ-ňŊ-ťŨ-žȘ-ț"

@@ -162,9 +162,11 @@ class HybridModel(Model):
 
     def point(self, values: Mapping[str, float], at: Point, t: Time) -> OperatingPoint:
         """The equations of the phase that goes on at a point, and where it is; see `Model.point`."""
+        from shaftwork.frequency.analysis import without_swing
+
         time, state = self.hybrid_state_at(values, at, t)
-        regime = state.regime
-        return OperatingPoint(regime.equations.model, regime.p, time, state.x, self.words(state))
+        model, p = state.regime.equations.model, state.regime.p
+        return OperatingPoint(model, without_swing(model, p), time, state.x, self.words(state))
 
     def hybrid_state_at(self, values: Mapping[str, float], at: Point, t: Time) -> tuple[float, HybridState]:
         """Time in s at a point, and the modes that go on there with their states; see `point`."""

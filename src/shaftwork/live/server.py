@@ -18,6 +18,7 @@ from shaftwork.core.errors import ParameterError, ShaftworkError, imported
 from shaftwork.core.parameters import whole
 from shaftwork.live.admission import HOST, HOSTS, Admission
 from shaftwork.live.page import SCRIPTS, WEB, plotly_script, served_page
+from shaftwork.live.page_requests import checked
 from shaftwork.live.session import Session
 from shaftwork.modelfiles.storage import write_netlist
 from shaftwork.pipeline.network import Network
@@ -154,7 +155,11 @@ def application(session: Session, token: str, port: int) -> Starlette:
     async def answers(line: WebSocket) -> None:
         await line.accept()
         with contextlib.suppress(WebSocketDisconnect):  # the page may be closed before it is answered
-            async for text in line.iter_text():
+            while True:
+                message = await line.receive()
+                if message["type"] == "websocket.disconnect":
+                    return
+                text = message.get("text") or ""  # a frame of bytes is no request
                 async with one:
                     answer = await asyncio.to_thread(_answered, session, text)
                 await line.send_text(answer)
@@ -184,7 +189,7 @@ def _answered(session: Session, text: str) -> str:
 def _written(session: Session, name: str, text: bytes) -> bytes | str:
     """A file of the values in a request; a text says why there is none."""
     try:
-        request = json.loads(text)
+        request = checked(json.loads(text))
         subject = session.changed(request["set"])
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / name
@@ -192,7 +197,7 @@ def _written(session: Session, name: str, text: bytes) -> bytes | str:
                 network = subject if isinstance(subject, Network) else subject()
                 write_netlist(network.netlist(), path)
             else:
-                report(subject, t_end=request["t_end"], signals=session.signals).save(path)
+                report(subject, t_end=request.get("t_end", session.t_end), signals=session.signals).save(path)
             return path.read_bytes()
     except ShaftworkError as error:
         return str(error)

@@ -287,10 +287,10 @@ class Model(CompiledModel):
             SignalError: there is no such quantity.
             SimulationError: a shaft is a wave.
         """
-        from shaftwork.frequency.analysis import operating_point
+        from shaftwork.frequency.analysis import operating_point, without_swing
 
         p = self.vector(values)
-        return OperatingPoint(self, p, *operating_point(self, p, at, t, self.settled(p)))
+        return OperatingPoint(self, without_swing(self, p), *operating_point(self, p, at, t, self.settled(p)))
 
     def choose_engine(self, t_end: float, *, t_start: float = 0.0, rtol: float = 1e-8) -> tuple[str, str]:
         """The engine that "auto" takes for a motion, and why."""

@@ -105,9 +105,11 @@ def energy(subject: Subject) -> str:
 def cycles(subject: Subject) -> str:
     """Load cycles of what is twisted, and the damage by its S-N line."""
     solution = subject.solution
-    names = twisted(solution.reader)[:MOST_CYCLES] if solution else ()
-    if solution is None or not names:
+    there = twisted(solution.reader) if solution else ()
+    if solution is None or not there:
         return ""
+    ranges = {name: solution.max(name) - solution.min(name) for name in there}
+    names = sorted(there, key=lambda name: -ranges[name])[:MOST_CYCLES]
     try:
         counts = {name: solution.rainflow(name, place=_worst_place(solution, name)) for name in names}
     except MissingExtraError as missing:
@@ -120,6 +122,7 @@ def cycles(subject: Subject) -> str:
     said = (
         "Cycles are counted by rainflow after ASTM E1049; one that stays open counts half. Along a shaft those of the "
         "place with the largest torque stand here."
+        + (f" Of {len(there)} shafts and springs those with the largest range do." if len(there) > len(names) else "")
     )
     table = columns(("Quantity", "Largest range", "Cycles", "Unit"), rows, (4, 2, 2, 2))
     return paragraphs(in_text(said), table, _damage(subject, solution))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import math
 import textwrap
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 from shaftwork.core.errors import ParameterError
 from shaftwork.equations.spelling import in_text
 from shaftwork.latex.document import BEGIN, PREAMBLE
+from shaftwork.numerics.tolerances import TYPED
 from shaftwork.pipeline.arguments import Point
 from shaftwork.pipeline.network import Network, network_of
 from shaftwork.reporting import motion_sections, network_sections, vibration_sections
@@ -202,6 +204,9 @@ def report(
           Parts and values, Extremes
     """
     words, wanted = _checked(text or {}, sections)
+    _refuse_wrong(contents)
+    if solution is not None and t_end is not None:
+        raise ParameterError("solution= and t_end= both say how long the motion is. Leave out one of them.")
     scene = subject if isinstance(subject, Scene) else None
     about = _subject(subject, solution, t_end, source, contents)
     headed = title if title is not None else scene.title if scene else about.network.name
@@ -226,8 +231,10 @@ def _subject(
     scene = subject if isinstance(subject, Scene) else None
     network = subject() if isinstance(subject, Scene) else network_of(subject)
     end = t_end if t_end is not None else scene.t_end if scene else None
+    _refuse_foreign(solution, network)
     motion = network.simulate(end) if solution is None and end is not None else solution
     origin = source if source is not None else scene.source if scene else ""
+    _refuse_unknown(contents.get("origins", {}), network)
     literature = (full for short, full in LITERATURE.items() if short in origin)
     return Subject(
         network=network,
@@ -261,6 +268,57 @@ def _checked(words: Mapping[str, str], sections: Sequence[str] | None) -> tuple[
             if name not in names:
                 raise ParameterError(f"{argument}: there is no section {name!r}. There are: {', '.join(names)}.")
     return words, tuple(SECTIONS if sections is None else sections)
+
+
+def _refuse_wrong(contents: Contents) -> None:
+    """Refuse what a report has not, and a text where a list is meant.
+
+    Raises:
+        ParameterError: it is so.
+    """
+    for name, value in contents.items():
+        if name not in Contents.__annotations__:
+            raise ParameterError(f"report: there is no {name!r}. There are: {', '.join(Contents.__annotations__)}.")
+        if name in ("signals", "phases", "assumptions", "references") and isinstance(value, str):
+            raise ParameterError(f"{name} = {value!r} must be a list of texts, such as [{value!r}].")
+
+
+def _refuse_foreign(solution: Solution | None, network: Network) -> None:
+    """Refuse the motion of another network.
+
+    Raises:
+        ParameterError: it has other parts, or other values of their parameters.
+    """
+    if solution is None:
+        return
+    there = {part.name: part.values for part in network.parts}
+    named = {name.rpartition(".") for name in solution.parameters}
+    strange = [part for part, _, _ in named if part not in there]
+    other = [
+        f"{part}.{name}"
+        for part, _, name in named
+        if isinstance(value := there.get(part, {}).get(name), float | int)
+        and not isinstance(value, bool)
+        and not math.isclose(value, solution.parameters[f"{part}.{name}"], rel_tol=TYPED)
+    ]
+    if strange or other:
+        what = f"part '{strange[0]}'" if strange else f"'{min(other)}' has another value"
+        raise ParameterError(
+            f"solution is a motion of another network than '{network.name}': {what}. Give the network that it is of."
+        )
+
+
+def _refuse_unknown(origins: Mapping[str, str], network: Network) -> None:
+    """Refuse an origin of a part or parameter that there is not.
+
+    Raises:
+        ParameterError: there is none of this name.
+    """
+    there = {part.name: [f"{part.name}.{name}" for name in part.declared] for part in network.parts}
+    for name in origins:
+        if name not in there and all(name not in parameters for parameters in there.values()):
+            near = there.get(name.rpartition(".")[0]) or list(there)
+            raise ParameterError(f"origins: there is no part or parameter {name!r}. There are: {', '.join(near[:20])}.")
 
 
 def _states(solution: Solution | None) -> tuple[str, ...]:

@@ -43,7 +43,11 @@ def campbell(subject: Subject) -> str:
     """Natural frequencies and orders over the speed, and where they meet."""
     if not len(subject.speeds):
         return ""
-    diagram = subject.network.campbell(subject.speeds, subject.orders, at=subject.at)
+    try:
+        diagram = subject.network.campbell(subject.speeds, subject.orders, at=subject.at)
+    except ShaftworkError as reason:
+        subject.notes.append(f"The Campbell diagram is left out: {reason}")
+        return ""
     subject.figures["campbell"] = diagram.plot()
     rows = [
         (number(one.speed * 30 / math.pi), number(one.order), number(one.frequency), in_text(one.mode))
@@ -60,7 +64,9 @@ def torsional(subject: Subject) -> str:
         return ""
     judged = [name for name, shaft in calculation.items() if shaft.limits is not None]
     subject.figures["torsional"] = calculation.plot(*judged)
-    rows = [tuple(map(in_text, row)) for row in calculation.table]
+    rows = [
+        tuple(in_text(cell).replace(r"$\mathrm{tau\_c}$", r"$\tau_c$") for cell in row) for row in calculation.table
+    ]
     heads = ("Shaft", "Torque in kN m", "at 1/min", "Order", r"Stress in N/mm$^2$", r"$\tau_c$", "Verdict")
     barred = [f"{shaft.shaft}: {one}" for shaft in calculation.values() for one in shaft.barred]
     rule = (
@@ -95,7 +101,8 @@ def _holzer(mode: Any) -> str:
 def _heat(calculation: Any) -> str:
     """What parts turn into heat, at the speed at which each does most."""
     most = {part: float(power.max()) for part, power in calculation.power_lost.items()}
-    rows = [(breakable(part), number(power)) for part, power in most.items() if power > 0.0]
+    least = 1e-6 * max(most.values(), default=0.0)  # the rest is rounding
+    rows = [(breakable(part), number(power)) for part, power in most.items() if power > least]
     return columns(("Heat of the vibration in", "W, at most"), rows, (3, 2))
 
 

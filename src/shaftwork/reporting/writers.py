@@ -8,7 +8,7 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shaftwork.core.errors import imported
+from shaftwork.core.errors import ShaftworkError, imported
 from shaftwork.drawing.canvas import Drawing
 from shaftwork.reporting.plots import plots
 
@@ -19,6 +19,11 @@ EXTRA = "report"
 INCLUDED = re.compile(r"\\includegraphics\[[^]]*\]\{([^}]*)\}")
 MARK = "PLOT-OF-"
 """Before the name of a plot, where it will stand in the page."""
+UPRIGHT = re.compile(r"\$\\mathrm\{((?:\\text\{(?:[^{}]|\\[{}])*\}|[^{}$\\^_]|\\[_%&# ])+)\}\$")
+"""A word that is printed as a formula because it has signs that text must escape."""
+IN_TEXT = re.compile(r"\\text\{((?:[^{}]|\\[{}])*)\}")
+BEFORE_CELLS = re.compile(r"(\\end(?:head|foot|lastfoot))\b")
+"""Commands of a table before its first cell."""
 PAGE = Path(__file__).with_name("page.css")
 SHEET = Path(__file__).with_name("sheet.typ")
 
@@ -29,7 +34,8 @@ def as_latex(words: str) -> str:
     Raises:
         MissingExtraError: pandoc is not installed.
     """
-    return _converted(words, "markdown", "latex")
+    # a backslash of a path is no command, and a heading is one below that of the section
+    return _converted(words, "markdown-raw_tex", "latex", "--shift-heading-level-by=1")
 
 
 def html_page(report: Report) -> str:
@@ -54,7 +60,11 @@ def write_pdf(report: Report, path: Path) -> None:
         options = ("--standalone", "--number-sections", f"--template={SHEET}", "--default-image-extension=svg")
         sheet = Path(folder) / "report.typ"
         sheet.write_text(_converted(report.latex, "latex", "typst", *options), encoding="utf-8")
-        path.write_bytes(typst.compile(str(sheet)))
+        try:
+            path.write_bytes(typst.compile(str(sheet)))
+        except typst.TypstError as error:
+            reason = " ".join(str(error).split())
+            raise ShaftworkError(f"The report cannot be set as PDF: {reason}. Take .html or .tex.") from None
 
 
 def write_latex(report: Report, path: Path) -> None:
@@ -71,6 +81,12 @@ def _converted(text: str, source: str, target: str, *options: str) -> str:
         MissingExtraError: pandoc is not installed.
     """
     pandoc = imported("pypandoc", EXTRA, "Report")
+    if source == "latex":
+        # pandoc would take a number that stands behind these for their argument, and it would be lost
+        text = UPRIGHT.sub(
+            lambda word: IN_TEXT.sub(r"\1", word[1]), text
+        )  # a name with braces or quotes is no formula for pandoc
+        text = BEFORE_CELLS.sub(r"\1{}", text.replace(r">{\raggedright\arraybackslash}", ""))
     return str(pandoc.convert_text(text, target, format=source, extra_args=list(options)))
 
 

@@ -41,8 +41,13 @@ def new_figure(purpose: str, width: float, height: float, title: str = "") -> Fi
         raise MissingExtraError("matplotlib", "plot", purpose) from None
     figure = Figure(figsize=(width, height), layout="constrained")
     if title:
-        figure.suptitle(in_lines(title, width))
+        figure.suptitle(plain(in_lines(title, width)))
     return figure
+
+
+def plain(text: str) -> str:
+    """A text for a picture, in which names are no formulas."""
+    return text.replace("$", r"\$")
 
 
 def plot_signals(
@@ -128,10 +133,10 @@ def grouped(curves: Mapping[str, Curve], units: Mapping[str, str]) -> list[tuple
 def _draw(axis: Axes, unit: str, curves: Mapping[str, Curve]) -> None:
     for number, (name, (times, values)) in enumerate(curves.items()):
         if values.ndim == 1:
-            axis.plot(times, values, linewidth=1.2, color=f"C{number}", label=name)
+            axis.plot(times, values, linewidth=1.2, color=f"C{number}", label=plain(name))
             continue
         lines = axis.plot(times, values, linewidth=0.8, alpha=0.4, color=f"C{number}")
-        lines[0].set_label(f"{name} at {values.shape[1]} places")
+        lines[0].set_label(f"{plain(name)} at {values.shape[1]} places")
     axis.set_ylabel(unit)
     axis.grid(alpha=0.3)
     axis.legend(loc="best", framealpha=0.8, edgecolor="none")
@@ -152,7 +157,7 @@ def _draw_phases(axis: Axes, phases: Sequence[PhaseRow], parts: Sequence[str]) -
         spans = [(row.start, row.end - row.start) for row in phases]
         shades = [colors[row.modes[part]] for row in phases]
         axis.broken_barh(spans, (place - 0.4, 0.8), facecolors=shades, linewidth=0)
-    axis.set_yticks(range(len(parts)), parts)
+    axis.set_yticks(range(len(parts)), [plain(part) for part in parts])
     axis.set_ylim(len(parts) - 0.5, -0.5)
     handles = [Patch(color=color, label=word) for word, color in colors.items()]
     axis.figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 5), frameon=False)

@@ -13,7 +13,7 @@ from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
 from shaftwork.core.screen import in_columns
 from shaftwork.results.observer import RPM, Array, Reader, span_of
-from shaftwork.results.plotting import new_figure
+from shaftwork.results.plotting import new_figure, plain
 from shaftwork.spectra.spectrum import MOST, number_of, refined, windowed
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ class OrderSpectra:
         colours = axes.pcolormesh(
             self.orders, rows, self.amplitudes, shading="nearest", cmap="viridis", rasterized=True
         )
-        axes.set(xlabel=f"order of {self.speed}", ylabel="speed in 1/min" if rising else "t in s")
+        axes.set(xlabel=plain(f"order of {self.speed}"), ylabel="speed in 1/min" if rising else "t in s")
         figure.colorbar(colours, label=f"amplitude in {self.unit}")
         return figure
 

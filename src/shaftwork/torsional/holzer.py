@@ -25,7 +25,7 @@ class HolzerMass(NamedTuple):
     Args:
         name: of the inertia.
         amplitude: its angle over that of the measuring mass; below 0 where it swings against it.
-        torque: that accelerates it, N m for 1 rad at the measuring mass.
+        torque: J omega^2 times its angle, with omega = 2 pi frequency, N m for 1 rad at the measuring mass.
     """
 
     name: str
@@ -131,10 +131,12 @@ def holzer_table(modes: Modes, shafts: Mapping[str, str], sections: Sequence[Sec
         size = np.abs(turned)
         first = 0 if size[0] > STILL * size.max() else int(size.argmax())
         scale = 1 / turned[first]
-        masses = [
-            HolzerMass(name, float((scale * angle).real), float((scale * force[number]).real))
-            for (name, _), angle, force in zip(inertias, turned, forces, strict=True)
-        ]
+        masses = []
+        for (name, _), angle, force in zip(inertias, turned, forces, strict=True):
+            amplitude = float((scale * angle).real)
+            # J omega^2 times the angle, as Holzer adds it up; of a damped mode the torque has another phase too
+            stiffness = float(abs(force[number] / angle)) if angle else 0.0
+            masses.append(HolzerMass(name, amplitude, stiffness * amplitude))
         passed = [_shaft(name, scale * torque[number], known.get(name)) for name, torque in torques.items()]
         damping, frequency = float(modes.damping[number]), float(modes.frequencies[number])
         measure = inertias[first][0]
