@@ -83,10 +83,8 @@ def spectrum(
     first, last = span_of(reader, start, end)
     wanted = None if f_max is None else in_si("f_max", f_max, "Hz")
     if wanted is not None and not 2.0 <= wanted * (last - first) < MOST / 4:  # two lines at least
-        highest = MOST / 4 / (last - first)
-        raise ParameterError(
-            f"f_max = {wanted:g} Hz must be above {2.0 / (last - first):g} and below {highest:g} Hz over {last - first:g} s."
-        )
+        lowest, highest = 2.0 / (last - first), MOST / 4 / (last - first)
+        raise ParameterError(f"f_max = {wanted:g} Hz must be {lowest:g} to {highest:g} Hz over {last - first:g} s.")
     read = reader.quantity(name, number_of(reader, name, place))
 
     def sampled(count: int) -> Array:
