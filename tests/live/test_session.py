@@ -35,6 +35,12 @@ def numbers(packed: dict[str, str]) -> Array:
     return np.frombuffer(base64.b64decode(packed["bdata"]))
 
 
+def test_a_spring_without_stiffness_is_shown_without_a_twist() -> None:
+    answer = Session(SCENES["crane-start"]).answer({"set": {"shaft.c": 0.0}})
+    assert "error" not in answer
+    np.testing.assert_array_equal(numbers(answer["curves"]["shaft.phi_rel"]), 0.0)
+
+
 def test_curves_are_those_of_simulate_with_the_same_values_to_the_last_bit(crane: Session) -> None:
     values = {"shaft.c": 12_000.0, "J2.J": 80.0}
     answer = crane.answer({"set": values})

@@ -337,9 +337,11 @@ def _shared_sums(terms: tuple[Expr, ...], owner: str) -> tuple[tuple[tuple[Symbo
     those that alone, as factors, are longer than a line.
     """
     counted = Counter(node for term in terms for node in preorder_traversal(term) if node.is_Add)
-    # a sum of fewer operations is not worth a letter; one of more can only be broken where it stands alone
+    # a sum of fewer operations is not worth a letter; one of so many terms can only be broken where it stands alone
     candidates = [
-        node for node, times in counted.items() if node.count_ops() >= (3 if times > 1 else 40) and node not in terms
+        node
+        for node, times in counted.items()
+        if node not in terms and (len(node.args) >= 6 if times == 1 else node.count_ops() >= 3)
     ]
     shared: list[tuple[Symbol, Expr]] = []
     for node in candidates[: len(AUXILIARY) - 1]:

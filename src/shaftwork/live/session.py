@@ -159,8 +159,9 @@ class Session:
             raise SimulationError(f"The session was closed at t = {reached:g} s of the motion.")
 
     def _curves(self, motion: Solution) -> dict[str, Any]:
-        names = dict.fromkeys((*self.signals, *self.stage.signals))
-        curves = {name: motion[name] for name in names}
+        curves = {name: motion[name] for name in self.signals}
+        for name in self.stage.signals:  # a spring without stiffness has no twist that is read
+            curves.setdefault(name, motion[name] if name in motion else np.zeros_like(motion.t))
         unbounded = [name for name, values in curves.items() if not np.isfinite(values).all()]
         if unbounded:
             raise SimulationError(

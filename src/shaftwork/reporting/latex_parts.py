@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 
 from shaftwork.equations.spelling import in_text
@@ -16,6 +17,8 @@ SPACE = 4.2
 
 def number(value: float, digits: int = 5) -> str:
     """A number as a formula."""
+    if math.isinf(value):
+        return "unbounded"
     return f"${printed_number(float(value), digits)}$"
 
 

@@ -263,6 +263,9 @@ def _checked(words: Mapping[str, str], sections: Sequence[str] | None) -> tuple[
     names = (WORDS[0], *SECTIONS, WORDS[1])
     if isinstance(sections, str):
         raise ParameterError(f"sections = {sections!r} must be a list of names, such as [{sections!r}].")
+    for name, said in words.items():
+        if not isinstance(said, str):
+            raise ParameterError(f"text: what is said to {name!r}, {said!r}, must be a text in Markdown.")
     for argument, chosen in (("text", words), ("sections", sections or ())):
         for name in chosen:
             if name not in names:
@@ -315,7 +318,9 @@ def _refuse_unknown(origins: Mapping[str, str], network: Network) -> None:
         ParameterError: there is none of this name.
     """
     there = {part.name: [f"{part.name}.{name}" for name in part.declared] for part in network.parts}
-    for name in origins:
+    for name, origin in origins.items():
+        if not isinstance(origin, str):
+            raise ParameterError(f"origins: {origin!r}, where {name!r} comes from, must be a text.")
         if name not in there and all(name not in parameters for parameters in there.values()):
             near = there.get(name.rpartition(".")[0]) or list(there)
             raise ParameterError(f"origins: there is no part or parameter {name!r}. There are: {', '.join(near[:20])}.")
