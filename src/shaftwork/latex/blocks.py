@@ -336,12 +336,14 @@ def _shared_sums(terms: tuple[Expr, ...], owner: str) -> tuple[tuple[tuple[Symbo
     """Sums of a law under symbols of their own, and the law with these symbols: long ones that occur several times, and
     those that alone, as factors, are longer than a line.
     """
-    counted = Counter(node for term in terms for node in preorder_traversal(term) if node.is_Add)
-    # a sum of fewer operations is not worth a letter; one of so many terms can only be broken where it stands alone
+    nodes = [node for term in terms for node in preorder_traversal(term)]
+    counted = Counter(node for node in nodes if node.is_Add)
+    factors = {node for product in nodes if product.is_Mul for node in product.args}  # only asked for membership
+    # a sum of fewer operations is not worth a letter; a factor of so many terms can only be broken standing alone
     candidates = [
         node
         for node, times in counted.items()
-        if node not in terms and (len(node.args) >= 6 if times == 1 else node.count_ops() >= 3)
+        if node not in terms and (node in factors and len(node.args) >= 6 if times == 1 else node.count_ops() >= 3)
     ]
     shared: list[tuple[Symbol, Expr]] = []
     for node in candidates[: len(AUXILIARY) - 1]:
