@@ -283,7 +283,7 @@ def test_auto_goes_on_with_scipy_where_a_law_in_the_midst_of_contacts_has_no_tay
 
 def test_an_end_of_a_mode_that_the_series_have_hidden_is_told() -> None:
     event_iteration = EventIteration(model().equation_sets, {}, (0.0, 10.0))
-    regime = event_iteration.regime(("open", "forward", "released"))
+    regime = event_iteration.transfer.regime(("open", "forward", "released"))
     size, bands = len(regime.equations.model.states), [1e-12] * len(regime.sides)
     passing = InPlaceEvents(event_iteration, HybridState(regime, np.zeros(size), bands), 0.0, lambda _t, _made: None)
     twist = regime.equations.model.states.index("gap.phi")
@@ -298,7 +298,7 @@ def test_an_end_of_a_mode_that_the_series_have_hidden_is_told() -> None:
 
 def test_the_rates_of_many_instants_are_those_of_each() -> None:
     event_iteration = EventIteration(model().equation_sets, {}, (0.0, 10.0))
-    regime = event_iteration.regime(("forward", "forward", "released"))
+    regime = event_iteration.transfer.regime(("forward", "forward", "released"))
     x = np.random.default_rng(0).normal(size=(5, len(regime.equations.model.states)))
     moment = HybridState(regime, x[0], [0.0] * len(regime.sides))
     problem = moment.problem((0.0, 10.0), regime.equations.model.switching.timeline(regime.p, 0.0, 10.0))
@@ -311,7 +311,7 @@ def test_the_rates_of_many_instants_are_those_of_each() -> None:
 def test_a_wheel_slips_in_the_way_it_is_pulled_where_the_rounding_of_a_moment_is_not_known() -> None:
     net = wheel(sw.TorqueSource("pull", tau=3.0), sw.CoulombLoad("load", tau=2.0))
     event_iteration = EventIteration(net.compile().equation_sets, {}, (0.0, 10.0))
-    regime = event_iteration.regime(("stuck",))
+    regime = event_iteration.transfer.regime(("stuck",))
     met = next(made.guard for made in regime.watched if made.leave.to == "forward")
     moment = HybridState(regime, np.zeros(len(regime.equations.model.states)))
     moment, changes = event_iteration.run(0.0, 0.0, moment, met)

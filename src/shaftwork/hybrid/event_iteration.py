@@ -49,11 +49,9 @@ class EventIteration:
         equations: Callable[[ModeNames], ModeEquations] | None = None,
     ) -> None:
         self.machines = equation_sets.machines
-        self._transfer = HybridTransfer(equation_sets, values, span, equations or equation_sets.of)
-        self.regime, self.resumed = self._transfer.regime, self._transfer.resumed
-        self._impacts = Impacts(self._transfer, together=equation_sets.netlist.impacts == "together")
-        self._commutation = Commutation(self._transfer)
-        self.jumped, self.possible = self._impacts.jumped, self._transfer.possible
+        self.transfer = HybridTransfer(equation_sets, values, span, equations or equation_sets.of)
+        self.impacts = Impacts(self.transfer, together=equation_sets.netlist.impacts == "together")
+        self._commutation = Commutation(self.transfer)
 
     def in_start_modes(self, t: float, x: Array, joins: Mapping[int, str] = MappingProxyType({})) -> HybridState:
         """The modes in which a motion starts, from the states of the equations in which no mode joins anything.
@@ -69,19 +67,19 @@ class EventIteration:
         Raises:
             ParameterError: a twist lies beyond a rigid limit.
         """
-        loose = HybridState(self.regime(with_modes(self._transfer.first, joins)), x)
+        loose = HybridState(self.transfer.regime(with_modes(self.transfer.first, joins)), x)
         refuse_beyond(loose, t)
         regime, modes = loose.regime, loose.regime.modes
         wanted = with_modes(regime.equations.first_modes(t, x, regime.p), joins)
-        if self.possible(wanted):
-            return self._transfer.to_modes(loose, t, wanted)
+        if self.transfer.possible(wanted):
+            return self.transfer.to_modes(loose, t, wanted)
         # of switches the time tells, so that others give way
         for k in sorted(range(len(wanted)), key=lambda k: not self.machines[k].is_switch):
             leaves = (leave for leave in self.machines[k].modes[wanted[k]].leaves if not leave.by_time)
             names = (wanted[k], *(leave.to for leave in leaves if leave.to))
             options = (with_modes(modes, {k: name}) for name in names)
-            modes = next(filter(self.possible, options), modes)
-        return self._transfer.to_modes(loose, t, modes)
+            modes = next(filter(self.transfer.possible, options), modes)
+        return self.transfer.to_modes(loose, t, modes)
 
     def started(self, t: float, x: Array) -> HybridState:
         """The modes that go on where a motion starts at a time in s with states (n,), as in `in_start_modes`."""
@@ -116,9 +114,9 @@ class EventIteration:
 
     def _joined(self, t: float, after: float, state: HybridState, joins: Mapping[int, str]) -> Transition:
         """The same instant with machines in modes in which they hold, and the changes to these."""
-        modes, joinable = state.regime.modes, self._transfer.joinable(state.regime.modes, joins)
+        modes, joinable = state.regime.modes, self.transfer.joinable(state.regime.modes, joins)
         changes = [Change(t, self.machines[k], modes[k], name) for k, name in joinable.items()]
-        return self._transfer.to_modes(state, after, with_modes(modes, joinable)), changes
+        return self.transfer.to_modes(state, after, with_modes(modes, joinable)), changes
 
     def _fewest(self, t: float, after: float, state: HybridState, met: int | None) -> Transition:
         """Of several guards that are met at one instant, rounding tells which of them ends the phase.
@@ -209,7 +207,7 @@ class EventIteration:
         to = leave.to or mode_anew(state, after, number)
         if machine.is_switch and (switched := self._commutation.switched(t, after, state, number, to)):
             return *switched, None, 0.0
-        speed = self._impacts.meets(state, after, machine.modes[to], number)
+        speed = self.impacts.meets(state, after, machine.modes[to], number)
         slips = next((name for side, name in machine.modes[to].gives_way if side * speed > 0), "")
         if slips == before:  # it was met by rounding alone: it is moving away
             return state, [], None, 0.0
@@ -217,7 +215,7 @@ class EventIteration:
             to, speed = slips, 0.0
         try:
             if speed or (leave.rebound is not None and not slips):
-                hit = self._impacts.hit(t, after, state, replace(ended, leave=replace(leave, to=to)))
+                hit = self.impacts.hit(t, after, state, replace(ended, leave=replace(leave, to=to)))
                 return *hit[:2], None, hit[2]
             modes = with_modes(regime.modes, {number: to})
             new, conducting = self._commutation.commutated(state, after, modes)
@@ -235,7 +233,7 @@ class EventIteration:
         """
         modes, (number, to) = state.regime.modes, wanted
         machine, before = self.machines[number], modes[number]
-        gears = self._impacts.gears
+        gears = self.impacts.gears
         if number in gears and (other := self._passing_on(after, state, number, to)) is not None:
             return other[0], [Change(t, machine, before, other[1])]
         leads = (leave for leave in machine.modes[to].leaves if leave.to not in ("", before))
@@ -247,10 +245,10 @@ class EventIteration:
         options = [*yields, *leads_on] if number in gears else [*leads_on, *yields]
         for k in gears:
             options += [{number: to, k: leave.to} for leave in self.machines[k].modes[modes[k]].leaves if k != number]
-        combinations = filter(self.possible, (with_modes(modes, option) for option in options))
+        combinations = filter(self.transfer.possible, (with_modes(modes, option) for option in options))
         for combination in islice(combinations, tried, None):
             try:
-                new = self._impacts.jammed(after, state, self._transfer.to_modes(state, after, combination))
+                new = self.impacts.jammed(after, state, self.transfer.to_modes(state, after, combination))
             except NetworkError:  # what slips behind the gear lets another one jam
                 continue
             return new, differences(t, self.machines, modes, new.regime.modes)
@@ -268,9 +266,9 @@ class EventIteration:
         leads = [leave.to for name in (to, modes[number]) for leave in options[name].leaves]
         for name in dict.fromkeys(leads):
             combination = with_modes(modes, {number: name})
-            if name in (to, modes[number]) or not self.possible(combination):
+            if name in (to, modes[number]) or not self.transfer.possible(combination):
                 continue
-            new = self._transfer.to_modes(state, t, combination)
+            new = self.transfer.to_modes(state, t, combination)
             if new.stored(t) == stored and not exceeded(new, t, new)[1]:
                 return new, name
         return None

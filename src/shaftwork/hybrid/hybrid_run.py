@@ -112,7 +112,7 @@ class HybridRun:
     def begin(self, initial: Mapping[str, float] | None) -> HybridState:
         """The states and modes at the start."""
         start, begins = self.demand.span[0], self._shared.begins
-        if self.event_iteration.regime(self.equation_sets.first).equations.model.form.waves:
+        if self.event_iteration.transfer.regime(self.equation_sets.first).equations.model.form.waves:
             begins = []  # what leaves the ends before the start is of the run
         if isinstance(initial, Ending):
             state, changes = self._resumed(initial)
@@ -159,15 +159,18 @@ class HybridRun:
         switches = [k for k, machine in enumerate(self.equation_sets.machines) if machine.is_switch]
         if not switches:
             return {}
-        regime = self.event_iteration.regime(self.equation_sets.first)
+        regime = self.event_iteration.transfer.regime(self.equation_sets.first)
         rest = np.zeros(len(regime.model.states))
         modes = regime.equations.first_modes(self._after(regime), rest, regime.p)
         joins = {k: modes[k] for k in switches if modes[k] != self.equation_sets.first[k]}
-        return joins if self.event_iteration.possible(with_modes(self.equation_sets.first, joins)) else {}
+        return joins if self.event_iteration.transfer.possible(with_modes(self.equation_sets.first, joins)) else {}
 
     def _read(self, initial: Mapping[str, float] | None, joins: Mapping[int, str]) -> HybridState:
         """Start values in the equations in which some machines join something."""
-        start, regime = self.demand.span[0], self.event_iteration.regime(with_modes(self.equation_sets.first, joins))
+        start, regime = (
+            self.demand.span[0],
+            self.event_iteration.transfer.regime(with_modes(self.equation_sets.first, joins)),
+        )
         equations = regime.equations
         if isinstance(initial, Mapping) and initial and start != 0:
             refuse_incomplete(equations.stores.names, initial, start)
@@ -196,12 +199,15 @@ class HybridRun:
 
     def _resumed(self, ending: Ending) -> Transition:
         """The states and modes in which another motion ended, and what changes at that instant."""
-        start, first = self.demand.span[0], self.event_iteration.regime(self.equation_sets.first)
+        start, first = self.demand.span[0], self.event_iteration.transfer.regime(self.equation_sets.first)
         x = self._beside_waves(first, np.zeros(len(first.model.states)), ending.waves)
-        state, changes = self.event_iteration.resumed(ending.beside(first.equations.arriving(x))), list[Change]()
+        state, changes = (
+            self.event_iteration.transfer.resumed(ending.beside(first.equations.arriving(x))),
+            list[Change](),
+        )
         after = self._instants(state).sides(start)[1]
         if after != ending.read and state.regime.form.has_impulses:
-            state, changes, _ = self.event_iteration.jumped(start, state, ending.read, after)
+            state, changes, _ = self.event_iteration.impacts.jumped(start, state, ending.read, after)
         state, further = self.event_iteration.run(start, after, state, None)
         return state, [*changes, *further]
 
@@ -300,7 +306,7 @@ class HybridRun:
             self.note(t, changes)
             return state
         if sides != (t, t) and state.regime.form.has_impulses:
-            state, changes, at_once = self.event_iteration.jumped(t, state, *sides)
+            state, changes, at_once = self.event_iteration.impacts.jumped(t, state, *sides)
             self.note(t, changes)
             self.jumps.append(at_once)
             met = None if changes else met

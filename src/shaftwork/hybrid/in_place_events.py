@@ -218,7 +218,7 @@ class InPlaceEvents:
         holds = machine.modes[leave.to].form != machine.modes[before].form
         if holds and not regime.equations.holds_by_numbers(number):
             return None
-        to = self._event_iteration.regime(with_modes(regime.modes, {number: leave.to}))
+        to = self._event_iteration.transfer.regime(with_modes(regime.modes, {number: leave.to}))
         watched = tuple((one.guard, one.side, _tells(ended, one, holds=holds)) for one in to.watched)
         return ModeChange(to, ended.side, watched, (machine, before, leave.to), holds)
 
