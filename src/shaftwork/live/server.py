@@ -10,7 +10,7 @@ import socket
 import tempfile
 import threading
 import webbrowser
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import AsyncIterator, Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -155,11 +155,7 @@ def application(session: Session, token: str, port: int) -> Starlette:
     async def answers(line: WebSocket) -> None:
         await line.accept()
         with contextlib.suppress(WebSocketDisconnect):  # the page may be closed before it is answered
-            while True:
-                message = await line.receive()
-                if message["type"] == "websocket.disconnect":
-                    return
-                text = message.get("text") or ""  # a frame of bytes is no request
+            async for text in _texts(line):
                 async with one:
                     answer = await asyncio.to_thread(_answered, session, text)
                 await line.send_text(answer)
@@ -176,6 +172,12 @@ def application(session: Session, token: str, port: int) -> Starlette:
             Middleware(Admission, token=token, port=port),
         ],
     )
+
+
+async def _texts(line: WebSocket) -> AsyncIterator[str]:
+    """What comes over a socket until it is closed; a frame of bytes, which is no request, as an empty text."""
+    while (message := await line.receive())["type"] != "websocket.disconnect":
+        yield message.get("text") or ""
 
 
 def _answered(session: Session, text: str) -> str:
