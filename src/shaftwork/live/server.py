@@ -146,9 +146,8 @@ def application(session: Session, token: str, port: int) -> Starlette:
         name = str(request.path_params["name"])
         if name not in FILES or int(request.headers.get("content-length", MOST_BYTES + 1)) > MOST_BYTES:
             return Response("There is no such file.", 404)
-        text = await request.body()
         async with one:
-            content = await asyncio.to_thread(_written, session, name, text)
+            content = await asyncio.to_thread(_written, session, name, await request.body())
         refused = isinstance(content, str)
         return Response(content, 422 if refused else 200, media_type="text/plain" if refused else FILES[name])
 
