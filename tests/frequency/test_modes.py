@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
+import sympy
 
 import shaftwork as sw
+from shaftwork.components import REGISTRY
 from shaftwork.frequency.eigenvalues import LARGEST_DENSE
 
 
@@ -322,3 +326,32 @@ def test_a_shape_is_scaled_by_the_unit_with_the_most_kinetic_energy() -> None:
     masses = [abs(modes.shapes[f"mass {k}.v"][swing]) for k in range(1, 5)]
     assert max(masses) == pytest.approx(1.0, rel=1e-12)
     assert abs(modes.shapes["drum.omega"][swing]) * 0.5 == pytest.approx(1 / 1.3, rel=1e-3)
+
+
+def test_what_swings_with_an_angle_is_no_spring() -> None:
+    """Its slope at one angle would be one; a part of one's own says by `swing` what takes it away."""
+
+    @sw.component
+    class Ripple(sw.Component):
+        size: float = sw.parameter("N*m", "swing", default=500.0)
+
+        ports = (sw.Port("a"),)
+        role = "source"
+        swing = "size"
+
+        def branches(self, p: Any) -> Iterator[Any]:
+            yield sw.ThroughLaw(-p.size * sympy.sin(2 * sw.INTEGRAL))
+
+    try:
+        gas = sw.HarmonicTorque("gas", harmonics=sw.Harmonics((2.0,), (500.0,), (-np.pi / 2,)))
+        for swinging in (Ripple("gas"), gas):
+            net = sw.Network("two masses")
+            net.add(swinging, "a")
+            net.add(sw.Inertia("J1", J=1.0), "a")
+            net.add(sw.Spring("shaft", c=1e3), "a", "b")
+            net.add(sw.Inertia("J2", J=1.0), "b")
+            modes = net.modes()
+            assert modes.rates[0] == 0.0  # it turns freely
+            assert modes.frequencies[-1] == pytest.approx(np.sqrt(2e3) / (2 * np.pi), rel=1e-12)
+    finally:
+        REGISTRY.pop("Ripple", None)

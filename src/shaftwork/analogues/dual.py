@@ -215,5 +215,6 @@ def _made(element: Element) -> Component:
             return Resistor(name, symbol=symbol, R=value)
         case Kind.ACROSS_SOURCE:
             return CurrentSource(name, symbol=symbol, i=value)
-        case _:
+        case Kind.THROUGH_SOURCE | Kind.LAW:
             return VoltageSource(name, symbol=symbol, u=-value)
+    raise AssertionError(f"{element.kind} of '{name}' has no dual element")  # pragma: no cover

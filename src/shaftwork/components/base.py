@@ -183,6 +183,7 @@ class Component:
     signal_ports: ClassVar[frozenset[str]] = frozenset()
     """Names of inner ports that carry signals of a controller: what its integrator stores is no energy."""
     role: ClassVar[Role] = "store"
+    swing: ClassVar[str] = ""  # the parameter that, at zero, leaves a law that swings with an angle its mean
     declared: ClassVar[Mapping[str, Parameter]] = {}
 
     def __new__(cls, *_args: Any, **_values: Any) -> Self:

@@ -260,6 +260,7 @@ class HarmonicTorque(Component):
     scale: float = parameter("1", "share of the swing; 0 where a cylinder misfires", default=1.0, latex="f")
 
     role: ClassVar[Role] = "source"
+    swing: ClassVar[str] = "scale"
     ports: ClassVar = (Port("a"), Port("b", optional=True))
 
     def __post_init__(self) -> None:

@@ -15,7 +15,6 @@ from shaftwork.codegen.compiled_model import CompiledModel
 from shaftwork.codegen.start_names import inner_nodes, node_of, speed_at
 from shaftwork.codegen.start_values import Start, initial_state
 from shaftwork.components.branches import ACROSS, INTEGRAL
-from shaftwork.components.excitations import HarmonicTorque
 from shaftwork.components.law_slopes import jumps, slope
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.domains import ELECTRICAL
@@ -161,11 +160,12 @@ def warn_of_turning_angles(bound: BoundArrays, t: float, x: Array) -> None:
 
 
 def without_swing(model: CompiledModel, p: Array) -> Array:
-    """The parameter vector with which harmonic torques have their mean alone, of which small motions are taken.
+    """The parameter vector with which what swings with an angle has its mean alone, of which small motions are taken.
 
-    At one angle of the shaft their swing would be a spring, which it is not over a turn: it excites.
+    At one angle of the shaft the swing would be a spring, which it is not over a turn: it excites.
     """
-    swinging = {f"{part.name}.scale" for part in model.form.graph.parts if isinstance(part.component, HarmonicTorque)}
+    parts = model.form.graph.parts
+    swinging = {f"{part.name}.{part.component.swing}" for part in parts if part.component.swing}
     names = tuple(model.parameters)
     return np.where([name in swinging for name in names], 0.0, p) if swinging else p
 
@@ -179,7 +179,7 @@ def _readers(form: StateForm, integral: int) -> tuple[str, ...]:
         for symbol in (*symbols, *(one for one, of in readings_of(graph, branch).items() if of == _integral(integral))):
             if slope(template.law, symbol).has(ACROSS, INTEGRAL, *template.reads) or jumps(template.law, symbol):
                 part = graph.part_of(branch)
-                if not isinstance(part.component, HarmonicTorque):  # whose swing is left out
+                if not part.component.swing:  # which is left out
                     names[part.name] = None
     return tuple(names)
 
