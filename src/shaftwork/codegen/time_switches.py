@@ -35,6 +35,8 @@ from shaftwork.numerics.tolerances import CLEARANCE
 
 DECADES = np.array([sign * 10.0**-place for place in range(1, 13) for sign in (-1, 1)])
 """Distances from a pulse that goes on far away, as parts of the run: no step gets from one to the next unawares."""
+MOST_PULSES = 10_000
+"""Pulses of a law at which engines end a step: each takes 0.1 ms, so more would take longer than the run."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,7 +239,7 @@ def _inside(switches: Sequence[_Switch], p: Array, t0: float, t_end: float) -> I
     """Times in s at which arguments are zero, where they are not too many to be followed."""
     for one in switches:
         changes = one.changes(p, t0, t_end) or []
-        for time, _ in changes if len(changes) <= 10_000 else ():  # more would take a second, at 0.1 ms each
+        for time, _ in changes if len(changes) <= MOST_PULSES else ():
             yield time
             yield from (time + DECADES * (t_end - t0)).tolist() if one.far else ()
 

@@ -20,6 +20,8 @@ from shaftwork.frequency.frequency_response import solved_densely
 from shaftwork.frequency.natural_modes import EQUAL, Modes, checked_count, largest_rate, modes_of, states_that_act
 from shaftwork.results.observer import Array, Complex, blocks
 
+MODES = 10
+"""Modes where nobody says how many."""
 WIDER = 1.3
 """The mesh is right up to so many times the largest rate wanted: the circle for the count passes a gap between."""
 BELOW = 0.5
@@ -173,7 +175,7 @@ def find_exact_modes(
         if radius > limit:
             _stop(slopes, limit, f"f_max = {f_max:g} Hz")
         return _lowest(_settled(title, slopes, starts, min(radius, limit)), wanted)
-    enough = 10 if wanted is None else wanted
+    enough = MODES if wanted is None else wanted
     radius = min(np.pi * enough / float(slopes.lines.delay.sum()), limit)
     while slopes.lines.half_waves(radius).sum() > 1.01 * enough:  # a mode for each half wave, roughly
         radius /= 2

@@ -23,6 +23,8 @@ from shaftwork.results.solution import Solution
 
 FINEST_RTOL = float(np.finfo(float).eps)
 """What doubles can keep; a smaller tolerance would promise what no engine holds."""
+OUTPUTS = 1001
+"""Output times where the user gives none."""
 NOMINAL = 1e-3
 """Absolute tolerance as a fraction of the relative one, for a speed of 1 rad/s (m/s, V)."""
 STUDIED = ("auto", *ENGINES, "wave")
@@ -181,7 +183,7 @@ def output_times(t_eval: OutputTimes, start: float, end: float) -> Array | None:
             raise ParameterError(f"t_eval = '{t_eval}' must be times, their number, or 'steps'.")
         return None
     if t_eval is None or isinstance(t_eval, (int, np.integer)):
-        count = 1001 if t_eval is None else int(t_eval)
+        count = OUTPUTS if t_eval is None else int(t_eval)
         if not 2 <= count <= MOST_OUTPUTS:
             raise ParameterError(f"t_eval = {count} output times: give at least 2 and at most {MOST_OUTPUTS}.")
         return np.linspace(start, end, count)

@@ -36,6 +36,8 @@ QUANTITIES = ("tau_a", "tau_b", "tau_mid", "omega_a", "omega_b")
 ENDS = tuple(name for name in QUANTITIES if name != "tau_mid")
 COARSE = Spectral(8)
 """The model of a network whose shafts are then taken without one."""
+FINE, FINER = 48, 64
+"""Degrees of two spectral models whose difference says how well the finer one stands for the truth."""
 TIGHT = 1e-11
 """Tolerance of runs that stand for the truth."""
 NONLINEAR, LOOSER = (8, 12, 16, 24, 32), 1e-8
@@ -102,7 +104,7 @@ def exact_motion(
         with suppress(ShaftworkError):  # such as a clearance at an end of a shaft where no inertia is
             return ShaftMotion(_read(with_model(net, shaft, Wave(3)), shaft, t_end, t), TIGHT, "travelling waves")
     linear = with_model(net, shaft, COARSE).compile().linear
-    degrees, rtol = ((48, 64), TIGHT) if linear else (NONLINEAR, LOOSER)
+    degrees, rtol = ((FINE, FINER), TIGHT) if linear else (NONLINEAR, LOOSER)
     finer, gap, degree = dict[str, Array](), np.inf, 0
     for degree in degrees:
         tell(f"the motion with Spectral({degree}), which stands for the exact one")
