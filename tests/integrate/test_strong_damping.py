@@ -15,11 +15,11 @@ from scipy.integrate import solve_ivp
 
 import shaftwork as sw
 from shaftwork.core.errors import AccuracyWarning
-from shaftwork.integrate.engines import ENGINES, available
+from shaftwork.integrate.engines import GENERAL, available
 from tests.properties.examples import share_of_examples
 
 STIFFNESS, TORQUE, PERIODS = 1000.0, 10.0, 3.0
-INSTALLED = tuple(name for name in ENGINES if available(name))
+INSTALLED = tuple(name for name in GENERAL if available(name))
 EXPLICIT = ("scipy", "heyoka")
 # Of the largest torque, at rtol 1e-8: what adds up over thousands of steps on the edge of stability. CVODE, of order
 # five, is itself at 4e-6 after some periods without damping.

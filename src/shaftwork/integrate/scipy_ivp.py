@@ -22,8 +22,6 @@ Method = Literal["DOP853", "Radau"]
 
 METHODS: dict[str, Any] = {"DOP853": DOP853, "Radau": Radau}
 
-FINEST = ENGINES["scipy"].finest
-
 # A run is made again where the torques of dampers may be off by more than this factor times the tolerance.
 BEARABLE = 2.0
 
@@ -51,7 +49,7 @@ def solve(problem: Problem, method: Method = "DOP853") -> Trajectory:
         factor = cancellation(problem, times[few], states[few])
         if BEARABLE < factor < 1 / np.finfo(float).eps:  # it is beyond all bounds where nothing has moved yet
             # On the edge of stability errors are some 50 times as large as the tolerance that is asked for.
-            share = max(1 / (50 * factor), FINEST / problem.rtol)
+            share = max(1 / (50 * factor), ENGINES["scipy"].finest / problem.rtol)
             decay = rates(jacobians(problem)).decay
             # A longer step than is stable may well end right, because what is left of the fast motion is tiny at its
             # start, and yet be off inside by much more than the torque of a damper bears.
@@ -167,7 +165,7 @@ class _ScipyStepper:
         if self._solver is not None:
             self._calls = self.calls
         problem, functions = self._problem, self._functions
-        options: dict[str, Any] = {"rtol": max(problem.rtol, FINEST), "atol": problem.atol, "max_step": longest}
+        options: dict[str, Any] = {"rtol": problem.rtol, "atol": problem.atol, "max_step": longest}
         if self._method != "DOP853" and problem.jacobian is not None:
             options["jac"] = functions.jacobian
         with self._told(t, x):

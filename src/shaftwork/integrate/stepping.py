@@ -13,9 +13,6 @@ from shaftwork.integrate.guards import GuardWatch
 from shaftwork.integrate.problem import Array, DaeProblem, Problem, TimedProblem
 from shaftwork.integrate.smooth_intervals import SmoothInterval, both_sides, failure, pieces, start_of_piece, used_up
 
-# A run has stalled when so many steps together advance by less than so many times this part of the whole time.
-STALL_STEPS, STALL_SPAN = 2000, 1e-10
-
 
 class Step(NamedTuple):
     """A step that a method has made.
@@ -158,9 +155,12 @@ class Pace:
 
     Args:
         problem: what is being solved.
+        every: after so many steps it is looked whether the run has stalled.
+        least: a run has where these steps were on average shorter than this part of the whole time.
     """
 
-    def __init__(self, problem: TimedProblem) -> None:
+    def __init__(self, problem: TimedProblem, *, every: int = 2000, least: float = 1e-10) -> None:
+        self._every, self._least = every, least
         self._progress, self._duration = problem.progress, problem.t_end - problem.t0
         self._since, self._steps = problem.t0, 0
 
@@ -174,15 +174,15 @@ class Pace:
         if self._progress is not None:
             self._progress(t)
         self._steps += 1
-        if self._steps % STALL_STEPS:
+        if self._steps % self._every:
             return None
         advance, self._since = t - self._since, t
         # Where it rests, ten million such steps would make a run. Where a law is as the square root of the speed, such
         # a run would not end otherwise.
-        if advance >= STALL_STEPS * (1e-7 if rests else STALL_SPAN) * self._duration:
+        if advance >= self._every * (1e-7 if rests else self._least) * self._duration:
             return None
         return (
-            f"the last {STALL_STEPS} steps advanced by {advance:.2g} s only, as where the laws on both sides of a jump "
+            f"the last {self._every} steps advanced by {advance:.2g} s only, as where the laws on both sides of a jump "
             "drive the motion back to it. Give such a law a smooth transition, tanh(omega / 0.01) in place of "
             "sign(omega)"
         )

@@ -28,10 +28,6 @@ from shaftwork.integrate.sundials_solvers import (
 )
 from shaftwork.numerics.polynomials import Interpolant, interpolation_times
 
-# No tolerance is made tighter: absolute ones of small twists may be that tight.
-TIGHTEST_ATOL = 1e-17
-
-
 Opener = Callable[[SmoothInterval, Array], OpenedSolver]
 Opening = Callable[[float], Opener]
 """From the part of its tolerance with which a problem is solved."""
@@ -96,11 +92,17 @@ class _Marched:
     inside: list[Array]
 
 
-def _run(problem: Problem | DaeProblem, opening: Opening, inner: InnerTimes) -> _Marched:
+def _run(problem: Problem | DaeProblem, opening: Opening, inner: InnerTimes, tightest: float = 1e-17) -> _Marched:
     """All steps up to a guard; where they are few, they are made again with the tolerance that its course needs.
 
     Rebounds become ever shorter. After each a method starts with low order, and errs by its tolerance however short
     the flight is: with flights as small as the tolerance a series of rebounds would end early.
+
+    Args:
+        problem: what to solve.
+        opening: of its solvers.
+        inner: the times wanted in each step.
+        tightest: no tolerance is made tighter; absolute ones of small twists may be that tight.
     """
     share = 1.0
     while True:
@@ -108,11 +110,11 @@ def _run(problem: Problem | DaeProblem, opening: Opening, inner: InnerTimes) -> 
         stepper = _SundialsStepper(tight, opening(share), inner)
         with np.errstate(all="ignore"):
             marched = _Marched(march(tight, stepper), stepper.inside)
-        if marched.march.met is None or tight.rtol <= TIGHTEST_ATOL:
+        if marched.march.met is None or tight.rtol <= tightest:
             return marched
         if (part := share_of_tolerance(tight, marched.march.steps, marched.march.states)) > 0.5:
             return marched
-        share = max(part * share, TIGHTEST_ATOL / problem.rtol)
+        share = max(part * share, tightest / problem.rtol)
 
 
 class _SundialsStepper:

@@ -13,8 +13,8 @@ import numpy as np
 from shaftwork.core.errors import MissingExtraError, SimulationError
 from shaftwork.integrate.engines import ENGINES
 from shaftwork.integrate.problem import Array, Problem, Trajectory
-from shaftwork.integrate.smooth_intervals import PiecewiseDense, both_sides, failure, pieces, reached
-from shaftwork.integrate.taylor.heyoka_run import GUARD, TaylorRun
+from shaftwork.integrate.smooth_intervals import PiecewiseDense, both_sides, pieces, reached
+from shaftwork.integrate.taylor.heyoka_run import GUARD, TaylorRun, series_failure
 from shaftwork.integrate.taylor.heyoka_switches import SwitchWatch
 
 # Steps times states, some 50 ms, after which Python notices Ctrl-C and tells how far the run is.
@@ -59,7 +59,7 @@ def _tolerance(problem: Problem) -> float:
     Speeds keep some five digits more than that, in measured motions with gaps and clutches; where torques are larger
     beside them, it is tightened by so much.
     """
-    ordinary = min(max(problem.rtol, ENGINES["heyoka"].finest), ENGINES["heyoka"].loosest)
+    ordinary = min(problem.rtol, ENGINES["heyoka"].loosest)
     finest, coarsest = problem.atol.min(initial=np.inf), problem.atol.max(initial=0.0)
     tightened = problem.rtol * 1e5 * finest / coarsest if 0.0 < finest < coarsest else ordinary
     # in powers of ten, as each value compiles an integrator of its own
@@ -117,7 +117,7 @@ class _TaylorReplay:
                     break
             if self._end is not None and abs(run.integrator.time - self._end) > 1e-6 * (problem.t_end - problem.t0):
                 reason = f"the same run made again for its dense output ends there, not at t = {self._end:.9g} s"
-                raise failure(problem, "heyoka", run.integrator.time, run.state, reason)
+                raise series_failure(problem, run.integrator.time, run.state, reason)
         return tuple(tuple(recorder.segments) for recorder in recorders), run.met
 
     @property
