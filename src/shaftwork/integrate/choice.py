@@ -22,13 +22,14 @@ TRANSIENT_STEPS, STEPS_PER_RADIAN = 300.0, 20.0
 def choose(problem: Problem) -> tuple[str, str]:
     """The engine that suits a problem, and why, in one sentence.
 
-    Engines for special systems are asked first, whether they suit (`EngineEntry.special`). Else stiffness decides
-    between the best implicit engine here and the best explicit one.
+    Engines for special systems are asked first (`EngineEntry.special`). Else stiffness decides between the best
+    implicit engine here and the best explicit one.
 
     It looks at eigenvalues at a few states (milliseconds), so keep the answer where many similar problems are solved.
     """
     for name, entry in ENGINES.items():
-        if entry.special and entry.installed and (why := entry.function("suits")(problem)):
+        asked = entry.special and (problem.linear is not None or problem.x0.size > entry.asked_beyond)
+        if asked and entry.installed and (why := entry.function("suits")(problem)):
             return name, why
     compiled = available("heyoka") and problem.program is not None
     stiff = _stiff(problem, "heyoka" if compiled else "scipy")

@@ -123,9 +123,10 @@ def piecewise(starts: Array, parts: Sequence[Callable[[Array], Array]], size: in
     times = np.atleast_1d(np.asarray(times, dtype=float))
     index = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, len(parts) - 1)
     states = np.empty((times.size, size))
-    for number in np.unique(index):
-        chosen = index == number
-        states[chosen] = parts[number](times[chosen])
+    order = np.argsort(index, kind="stable")
+    for chosen in np.split(order, np.flatnonzero(np.diff(index[order])) + 1):
+        if chosen.size:
+            states[chosen] = parts[index[chosen[0]]](times[chosen])
     return states
 
 

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from shaftwork.integrate.crossings import Crossings
+from shaftwork.integrate.crossings import Crossings, Dense
 from shaftwork.integrate.guards import GuardWatch
-from shaftwork.integrate.problem import Array, DaeProblem, Problem, TimedProblem
-from shaftwork.integrate.smooth_intervals import SmoothInterval, both_sides, failure, pieces, start_of_piece, used_up
+from shaftwork.integrate.problem import Array, DaeProblem, Problem, TimedProblem, Trajectory
+from shaftwork.integrate.smooth_intervals import (
+    PiecewiseDense,
+    SmoothInterval,
+    both_sides,
+    failure,
+    pieces,
+    reached,
+    start_of_piece,
+    used_up,
+)
 
 
 class Step(NamedTuple):
@@ -25,7 +34,7 @@ class Step(NamedTuple):
 
     end: float
     state: Array
-    dense: Callable[[Array], Array]
+    dense: Dense
 
 
 class Stepper(Protocol):
@@ -105,6 +114,7 @@ class SteppedRun(NamedTuple):
         return both_sides(problem, times, [np.array(piece.states) for piece in self.pieces])
 
 
+@np.errstate(all="ignore")
 def march(problem: Problem | DaeProblem, stepper: Stepper) -> SteppedRun:
     """Step through all pieces of a problem, up to the first guard that is met.
 
@@ -148,6 +158,28 @@ def march(problem: Problem | DaeProblem, stepper: Stepper) -> SteppedRun:
             if switch is not None and t < piece.end:
                 x = stepper.open(piece, t, x)
     return SteppedRun(done, None)
+
+
+def trajectory(
+    problem: Problem, run: SteppedRun, parts: Sequence[Dense], statistics: Mapping[str, int] | None = None
+) -> Trajectory:
+    """What an engine returns of a run whose steps have dense output that lasts.
+
+    Args:
+        problem: what was solved.
+        run: from `march`.
+        parts: dense output of each step that was taken, in order.
+        statistics: counts by name beside that of the steps.
+    """
+    steps = run.steps
+    dense = PiecewiseDense(steps[:-1], tuple(parts), steps, problem.x0.size)
+    if problem.t_eval is None:
+        t, x = run.both_sides(problem)
+    else:
+        t = reached(problem.t_eval, run.end[0])
+        x = dense(t)
+    counts = {"steps": steps.size - 1, **(statistics or {})}
+    return Trajectory(t, x, dense, counts, met=run.met, end=run.end)
 
 
 class Pace:

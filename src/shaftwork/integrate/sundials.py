@@ -108,8 +108,7 @@ def _run(problem: Problem | DaeProblem, opening: Opening, inner: InnerTimes, tig
     while True:
         tight = tightened(problem, share)
         stepper = _SundialsStepper(tight, opening(share), inner)
-        with np.errstate(all="ignore"):
-            marched = _Marched(march(tight, stepper), stepper.inside)
+        marched = _Marched(march(tight, stepper), stepper.inside)
         if marched.march.met is None or tight.rtol <= tightest:
             return marched
         if (part := share_of_tolerance(tight, marched.march.steps, marched.march.states)) > 0.5:

@@ -19,17 +19,16 @@ from shaftwork.integrate.collocation.banded_stages import (
     StepStart,
     shifted_collocation,
 )
+from shaftwork.integrate.engines import ENGINES
 from shaftwork.integrate.linear.propagation import cost
 from shaftwork.integrate.problem import Array, Problem, Trajectory
 from shaftwork.integrate.smooth_intervals import SmoothInterval, check_finite, failure
 from shaftwork.integrate.stepping import Step, SteppedRun, march
 from shaftwork.integrate.stiffness import STABLE, first_jacobian, is_chain, is_undamped, jacobians, rates
 
-# Beyond this many states it is taken for chains that are not linear and damped, where an explicit method needs more
-# steps than these. A Kloss motor on a damped shaft of 601 states, at rtol 1e-6: 0.34 s (error 2e-6 of the largest
-# torque), CVODE 13 s (error 1.5e-4); with 61 states 0.2 s and 1.6 s. There and on chains of 10000 elements it takes
-# some hundred steps, each as long as some explicit ones.
-LARGEST_NOT_BANDED, FEWEST_NOT_BANDED = 300, 1e4
+# `auto` takes the engine for damped chains that are not linear where an explicit method needs more steps than these: it
+# takes some hundred steps, even on chains of 10000 elements, each as long as some explicit ones.
+FEWEST_STEPS = 1e4
 
 
 def solve(problem: Problem) -> Trajectory:
@@ -47,8 +46,7 @@ def solve(problem: Problem) -> Trajectory:
     Source: Hairer and Wanner, Solving Ordinary Differential Equations II, 1996, chapter IV.
     """
     stepper = _BandedStepper(problem)
-    with np.errstate(all="ignore"):
-        whole = march(problem, stepper)
+    whole = march(problem, stepper)
     taken = sum(len(piece.times) - 1 for piece in whole.pieces)
     statistics = {"steps": taken, "rejected": stepper.tried - taken, **stepper.stages.counts}
     dense = _BandedDense(whole, stepper)
@@ -64,11 +62,12 @@ def suits(problem: Problem) -> str:
             return ""
         seconds = cost(problem, problem.straight)
         return f"The system is a long linear chain: exact propagation would take about {seconds:.2g} s."
-    if problem.x0.size <= LARGEST_NOT_BANDED or not is_chain(problem) or is_undamped(problem):
+    small = problem.x0.size <= ENGINES["banded"].asked_beyond
+    if small or not is_chain(problem) or is_undamped(problem):
         return ""
     fastest = rates(jacobians(problem))
     explicit_steps = max(fastest.decay, fastest.oscillation) * (problem.t_end - problem.t0) / STABLE
-    if explicit_steps <= FEWEST_NOT_BANDED:
+    if explicit_steps <= FEWEST_STEPS:
         return ""
     return (
         f"The system is a long damped chain: an explicit method would need about {explicit_steps:.2g} steps, "
