@@ -18,7 +18,7 @@ ENGINE_NAMES: tuple[EngineName, ...] = get_args(EngineName)
 
 @dataclass(frozen=True, kw_only=True)
 class EngineEntry:
-    """What an engine is, needs and keeps.
+    """What an engine is, needs and keeps: errors, help texts, documentation and `auto` follow from it.
 
     Args:
         module: of `shaftwork.integrate`, imported when a run takes the engine: its `solve` is the engine

@@ -38,7 +38,11 @@ class Step(NamedTuple):
 
 
 class Stepper(Protocol):
-    """A method as the loop uses it."""
+    """A method as the loop uses it: what it makes is looked at by `march`, and then taken or made again.
+
+    Its right-hand side and Jacobian are those of `smooth_intervals.GuardedFunctions`, which asks nothing outside the
+    piece and remembers what was not finite, and `smooth_intervals.failure` makes its errors.
+    """
 
     engine: str
     """Its name in messages."""
@@ -46,23 +50,43 @@ class Stepper(Protocol):
     """Whether a step may be cut off at a switch of a law, as no stage of it lies beyond; else it is made again."""
 
     def open(self, piece: SmoothInterval, t: float, x: Array) -> Array:
-        """Begin anew at a time in s of a piece in a state (n,); the consistent state (n,) with which it begins."""
+        """Begin anew in a state (n,): at the start of a piece, or at a time in s inside it, just past a switch.
+
+        Returns:
+            The state (n,) with which it begins, that of the argument unless equations bind the states.
+        """
         ...
 
     def step(self, t: float, x: Array) -> Step | None:
-        """Make a step from where the last one was taken to; None where it was too long, and a shorter one is to follow.
+        """Make a step from a time in s and a state (n,), up to the end of the piece at most.
+
+        Returns:
+            The step; None where its error was too large, and a shorter one is to follow.
 
         Raises:
-            SimulationError: it cannot.
+            SimulationError: it cannot, or a value is not finite.
         """
         ...
 
     def again(self, t: float, x: Array, end: float, longest: float) -> None:
-        """Make the next step from the start of the last one once more, up to an end in s, in steps of `longest` s."""
+        """Forget the last step; the next ones start there once more, and none ends beyond a switch.
+
+        Args:
+            t: where it started, s.
+            x: (n,) state there.
+            end: up to which they go at most, s; from there on the piece goes on to its own end.
+            longest: a step at most, s.
+        """
         ...
 
     def take(self, t: float, end: float, state: Array) -> None:
-        """Keep the last step, from a time in s up to an end in s with its state (n,): its own end, or one before it."""
+        """Keep the last step: dense output is asked for later.
+
+        Args:
+            t: where it started, s.
+            end: its own end in s, or one before it where a guard or a switch cuts it off.
+            state: (n,) there.
+        """
         ...
 
 
