@@ -64,7 +64,7 @@ def solve(
 
     Args:
         problem: what to solve.
-        engine: "auto" or a key of `ENGINES` with a module.
+        engine: "auto" or a key of `ENGINES`, that of waves aside.
         why: the reason of an earlier `choose`, where its answer is used again.
         fallback: whether another engine may go on where a Taylor series cannot; always so with "auto".
 

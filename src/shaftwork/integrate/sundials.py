@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -12,7 +11,6 @@ from typing import Literal
 import numpy as np
 
 from shaftwork.core.calls import unprinted
-from shaftwork.core.errors import MissingExtraError
 from shaftwork.integrate.guards import share_of_tolerance
 from shaftwork.integrate.problem import Array, DaeProblem, Problem, Trajectory, tightened
 from shaftwork.integrate.smooth_intervals import PiecewiseDense, SmoothInterval, check_finite, failure
@@ -43,12 +41,10 @@ def solve(problem: Problem, method: Method = "BDF") -> Trajectory:
         method: "BDF" for stiff systems, "Adams" for smooth motion that is not.
 
     Raises:
-        MissingExtraError: scikit-sundae is not installed.
         SimulationError: SUNDIALS gave up, with its reason.
 
     Source: Hindmarsh and others, SUNDIALS: suite of nonlinear and differential/algebraic equation solvers, 2005.
     """
-    _require("engine='sundials'")
 
     def opening(share: float) -> Opener:
         tight, pattern = tightened(problem, share), JacobianPattern(len(problem.x0))
@@ -61,23 +57,16 @@ def solve_dae(problem: DaeProblem) -> Trajectory:
     """Integrate an implicit problem with IDA, from consistent initial values that IDA finds at every piece's start.
 
     Raises:
-        MissingExtraError: scikit-sundae is not installed.
         SimulationError: SUNDIALS gave up, with its reason.
 
     Source: as `solve`.
     """
-    _require("A nonlinear algebraic loop")
 
     def opening(share: float) -> Opener:
         tight = tightened(problem, share)
         return lambda piece, x: open_ida(tight, piece, x)
 
     return _trajectory(problem, opening, DEGREES["BDF"])
-
-
-def _require(purpose: str) -> None:
-    if importlib.util.find_spec("sksundae") is None:
-        raise MissingExtraError("scikit-sundae", "stiff", purpose)
 
 
 InnerTimes = Callable[[float, float], Array]

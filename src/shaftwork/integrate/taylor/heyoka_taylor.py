@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 from collections.abc import Sequence
 from functools import cached_property
@@ -10,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from shaftwork.core.errors import MissingExtraError, SimulationError
+from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.engines import ENGINES
 from shaftwork.integrate.problem import Array, Problem, Trajectory
 from shaftwork.integrate.smooth_intervals import PiecewiseDense, both_sides, pieces, reached
@@ -29,14 +28,11 @@ def solve(problem: Problem) -> Trajectory:
     the equations in every step.
 
     Raises:
-        MissingExtraError: heyoka is not installed.
         SimulationError: the problem has no heyoka program, or the integration failed; a `SeriesError` where another
             engine may go on.
 
     Source: Biscani, Izzo, Revisiting high-order Taylor methods for astrodynamics and celestial mechanics, MNRAS 2021.
     """
-    if importlib.util.find_spec("heyoka") is None:
-        raise MissingExtraError("heyoka", "fast", "engine='heyoka'")
     if problem.program is None:
         raise SimulationError(
             f"heyoka compiles small networks whose laws have Taylor series. This one, of {problem.x0.size} states, is "
