@@ -17,18 +17,10 @@ from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, ModeNames, machines_of, with_laws_of_rest, with_modes
 from shaftwork.hybrid.modes.reactions import MANY, ReactionEquations, laws_that_hold
 from shaftwork.integrate import choice
-from shaftwork.integrate.engines import ADAMS, ENGINES, INNER, WAVE, available
+from shaftwork.integrate.engines import ENGINES, GENERAL
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.model import Model
-
-FOLLOWING = {
-    name: entry.following
-    for name, entry in (*ENGINES.items(), *INNER.items(), ("wave", WAVE))
-    if entry.following is not None
-}
-"""Engines that follow guards: the part of the tolerance that they run with, and the loosest one."""
-_ENGINES = ", ".join(sorted(name for name in FOLLOWING if name not in (ADAMS, "wave")))
 
 
 class EquationSets:
@@ -166,24 +158,27 @@ class EquationSets:
         key = equations, modes, engine
         if engine != "auto":
             choice.check(engine)
-            if engine not in FOLLOWING or engine == "wave":
+            entry = ENGINES[engine]
+            if entry.following is None:
+                following = sorted(name for name in GENERAL if ENGINES[name].following is not None)
                 raise ParameterError(
                     f"The engine '{engine}' follows no parts that change their mode "
-                    f"({', '.join(machine.name for machine in self.machines)}). Take one of: {_ENGINES}."
+                    f"({', '.join(machine.name for machine in self.machines)}). Take one of: {', '.join(following)}."
                 )
-            if engine != "sundials":
+            if not entry.unless_stiff:
                 return engine, "asked for"
             if key not in self._engines:
-                adams = ADAMS, "asked for; the motion is not stiff, so Adams' formulas are taken."
-                self._engines[key] = (engine, "asked for") if choice.is_stiff(problem()) else adams
+                other = entry.unless_stiff
+                why = f"asked for; the motion is not stiff, so {ENGINES[other].method} is taken."
+                self._engines[key] = (engine, "asked for") if choice.is_stiff(problem()) else (other, why)
             return self._engines[key]
         if key not in self._engines:
             easy = self._easy.setdefault(equations, {})
             if easy.keys() >= {*enumerate(modes)}:  # each of them was no trouble beside others
                 return next(iter(easy.values()))
             name, why = choice.choose(problem())
-            if name not in FOLLOWING:  # that of long chains
-                name = "sundials" if available("sundials") else "scipy-radau"
+            if ENGINES[name].following is None:  # that of long chains
+                name = choice.implicit()
             if name == "heyoka":
                 easy |= dict.fromkeys(enumerate(modes), (name, why))
             self._engines[key] = name, why

@@ -22,7 +22,7 @@ from shaftwork.core.notices import PulsationWarning, muted
 from shaftwork.core.parameters import in_si
 from shaftwork.formulation.form import StateForm
 from shaftwork.integrate import choice
-from shaftwork.integrate.engines import EngineName, available
+from shaftwork.integrate.engines import EngineName
 from shaftwork.integrate.problem import Problem, Trajectory
 from shaftwork.network.checks import resting_trains
 from shaftwork.network.netlist import Netlist
@@ -326,7 +326,7 @@ class Model(CompiledModel):
         if engine != "auto":
             return engine, "asked for"
         if self.form.loop_laws:
-            return "sundials" if available("sundials") else "scipy-radau", IMPLICIT
+            return choice.implicit(), IMPLICIT
         key = (problem.t0, problem.t_end, problem.rtol)
         for run, p, chosen in self._choices:
             # Parameters that differ by less than a factor of 5 suit the same engine: looking anew would cost more than
