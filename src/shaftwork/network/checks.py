@@ -234,6 +234,8 @@ def connection_problems(graph: CircuitGraph) -> tuple[Diagnostic, ...]:
 def resting_trains(graph: CircuitGraph) -> tuple[Diagnostic, ...]:
     """The trains beside a driven one in which nothing moves unless it is given a start value."""
     _, main, others = _split(graph, _ends(graph))
+    if not others:
+        return ()
     spelling = Spelling(graph.nodes)
     return tuple(_separate_train(graph, train, main, spelling) for train in others if _rests(graph, train, main))
 
