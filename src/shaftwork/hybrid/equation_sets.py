@@ -41,9 +41,11 @@ class EquationSets:
 
     kind: ClassVar[type[ModeEquations]] = ModeEquations
     """Of the sets of equations."""
+    model_kind: ClassVar[type[Model]] = Model
+    """Of the models of one phase."""
 
     def __init__(self, base: Model, rebuild: Callable[[Netlist], Model]) -> None:
-        self.netlist, self._rebuild = base.netlist, rebuild
+        self.netlist, self._form, self._rebuild = base.netlist, base.form, rebuild
         self.machines = machines_of(base.form.graph)
         self.first: ModeNames = tuple(machine.first for machine in self.machines)
         self._by_forms: dict[tuple[str, ...], ModeEquations | NetworkError] = {}
@@ -65,7 +67,8 @@ class EquationSets:
             try:
                 with muted(NetworkWarning):  # of the network as it is wired compilation has warned
                     netlist = self._netlist(forms)
-                    model = self._rebuild(netlist)
+                    first = forms == tuple(machine.modes[machine.first].form for machine in self.machines)
+                    model = self.model_kind(self._form, netlist, self._rebuild) if first else self._rebuild(netlist)
                     if (resting := with_laws_of_rest(netlist, model.form)) is not netlist:
                         model = self._rebuild(resting)
                 equations: ModeEquations | NetworkError = self.kind(model, self.machines, forms)

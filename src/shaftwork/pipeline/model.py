@@ -153,7 +153,7 @@ class Model(CompiledModel):
         if initial is None or (isinstance(initial, Mapping) and not isinstance(initial, Ending)):
             warn_of_rest(self.name, self._resting, initial or {})
         motion = with_accuracy(told.of(lambda: self._motion(values, initial, demand)), demand)
-        parameters = dict(zip(self.parameters, self.defaults.tolist(), strict=True)) | values
+        parameters = {**self.parameters, **values}
         again = Repetition(self._rebuild, self.netlist, call_of(motion, demand, values, initial), self)
         return replace(motion, parameters=parameters, initial=dict(initial or {}), rtol=demand.rtol, again=again)
 
