@@ -39,6 +39,9 @@ from shaftwork.network.templates import BranchTemplate, Shared
 LEFT_OUT = ("node name", "node count", "wrong domain", "no effect", "component")
 """Kinds of problems whose part is left out of what is examined further."""
 
+SEPARATE = "separate train"
+"""The kind of problem of a train beside the largest one."""
+
 Train = tuple[int, ...]
 """Numbers of the parts that hang together."""
 
@@ -235,8 +238,6 @@ def connection_problems(graph: CircuitGraph) -> tuple[Diagnostic, ...]:
 def resting_trains(graph: CircuitGraph) -> tuple[Diagnostic, ...]:
     """The trains beside a driven one in which nothing moves unless it is given a start value."""
     _, main, others = _split(graph, _ends(graph))
-    if not others:
-        return ()
     spelling = Spelling(graph.nodes)
     return tuple(_separate_train(graph, train, main, spelling) for train in others if _rests(graph, train, main))
 
@@ -348,7 +349,7 @@ def _separate_train(graph: CircuitGraph, train: Train, main: Train, spelling: Sp
     nodes = tuple(graph.nodes[node] for node in _port_nodes(graph, train))
     others = listed(tuple(graph.parts[number].name for number in main), most=3)
     return Diagnostic(
-        "separate train",
+        SEPARATE,
         f"{listed(names)} at {at_nodes(nodes)} share{'s' * (len(names) == 1)} no node with {others}"
         + (", and nothing drives that train." if _rests(graph, train, main) else "."),
         f"Join the two{spelling.suggestion(nodes)}, or simulate them as two networks.",

@@ -11,6 +11,7 @@ from shaftwork.core.errors import Diagnostic, NetworkError, NetworkWarning
 from shaftwork.core.notices import warn
 from shaftwork.formulation.diagnosis import diagnose
 from shaftwork.formulation.form import StateForm
+from shaftwork.network.checks import SEPARATE, resting_trains
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.angles import with_angles
 from shaftwork.pipeline.model import Model
@@ -67,10 +68,12 @@ class Compiler:
             NetworkError: it cannot be assembled.
         """
         with _without_collection():
-            form = _sound(netlist, *diagnose_motion(netlist), self.accepted)
+            diagnosed, problems = diagnose_motion(netlist)
+            form = _sound(netlist, diagnosed, problems, self.accepted)
             if self.angles:
                 form = with_angles(form.graph, self.angles)
-            return _kind_of_model(form, netlist)(form, netlist, self)
+            apart = any(problem.kind == SEPARATE for problem in problems)
+            return _kind_of_model(form, netlist)(form, netlist, self, resting_trains(form.graph) if apart else ())
 
 
 def _has_modes(form: StateForm, netlist: Netlist) -> bool:
