@@ -46,8 +46,7 @@ from shaftwork.network.kinds import CHANGE, Kind, Resolved, beyond_constant, cha
 
 T = TypeVar("T")
 Choices = tuple[ModeChoice, ...] | None
-"""What is chosen for each element of a part that has modes: nothing for the first modes, None for their forms alone, in
-which the numbers of modes are parameters."""
+"""Of the elements of a part with modes; () for the first modes, None for their forms with numbers as parameters."""
 
 
 @dataclass(frozen=True, eq=False)
