@@ -33,9 +33,11 @@ class EquationSets:
 
     kind: ClassVar[type[ModeEquations]] = ModeEquations
     """Of the sets of equations."""
+    model_kind: ClassVar[type[Model]] = Model
+    """Of the models of one phase."""
 
     def __init__(self, base: Model, rebuild: Callable[[Netlist], Model]) -> None:
-        self.netlist, self._rebuild = base.netlist, rebuild
+        self.netlist, self._form, self._rebuild = base.netlist, base.form, rebuild
         self.machines = machines_of(base.form.graph)
         self.first: ModeNames = tuple(machine.first for machine in self.machines)
         self._by_forms: dict[tuple[str, ...], ModeEquations | NetworkError] = {}
@@ -55,12 +57,7 @@ class EquationSets:
         forms = tuple(machine.modes[name].form for machine, name in zip(self.machines, modes, strict=True))
         if forms not in self._by_forms:
             try:
-                with muted(NetworkWarning):  # of the network as it is wired compilation has warned
-                    netlist = self._netlist(forms)
-                    model = self._rebuild(netlist)
-                    if (resting := with_laws_of_rest(netlist, model.form)) is not netlist:
-                        model = self._rebuild(resting)
-                equations: ModeEquations | NetworkError = self.kind(model, self.machines, forms)
+                equations: ModeEquations | NetworkError = self.kind(self._model(forms), self.machines, forms)
             except NetworkError as error:
                 equations = error
             self._by_forms.setdefault(forms, equations)  # another thread may have been first
@@ -68,6 +65,18 @@ class EquationSets:
         if isinstance(equations, NetworkError):
             raise equations.with_traceback(None)  # else it would keep the frames of every time that it was raised
         return equations
+
+    def _model(self, forms: tuple[str, ...]) -> Model:
+        """The model in a combination of forms; the first one has been assembled when the network was compiled."""
+        netlist = self._netlist(forms)
+        is_first = forms == tuple(machine.modes[machine.first].form for machine in self.machines)
+        model = self.model_kind(self._form, netlist, self._rebuild) if is_first else self._assembled(netlist)
+        resting = with_laws_of_rest(netlist, model.form)
+        return model if resting is netlist else self._assembled(resting)
+
+    def _assembled(self, netlist: Netlist) -> Model:
+        with muted(NetworkWarning):  # of the network as it is wired compilation has warned
+            return self._rebuild(netlist)
 
     def first_equations(self, values: Mapping[str, float]) -> tuple[ModeEquations, Array]:
         """The equations in the first mode of each machine, and their parameters: start values are read in these.
@@ -100,7 +109,8 @@ class EquationSets:
         slipping = self._slipping[forms]
         if slipping is None or not (slipping.suits(engine) or (len(able) >= MANY and engine != "heyoka")):
             return self.of(modes)
-        if self_locks(slipping.model.form, {**slipping.model.parameters, **values}):
+        form = slipping.model.form
+        if form.loses_power and self_locks(form, {**slipping.model.parameters, **values}):
             return self.of(modes)  # whether it jams depends on what is held
         if (forms, holding) not in self._holding:
             self._holding[forms, holding] = slipping.holding(holding)

@@ -285,10 +285,12 @@ class HybridRun:
         """One run of the engine, up to other equations or an instant at which an input jumps; what goes on then."""
         regime, form = state.regime, state.regime.form
         bind = partial(regime.equations.bound, regime.p)
-        refuse_vanishing(form, bind, lambda: np.array([t]), lambda _: state.x[None])
+        if form.doubtful:
+            refuse_vanishing(form, bind, lambda: np.array([t]), lambda _: state.x[None])
         trajectory, in_place = self._followed(t, state)
         in_place.close()
-        refuse_vanishing(form, bind, lambda: trajectory.dense.steps, trajectory.dense)
+        if form.doubtful:
+            refuse_vanishing(form, bind, lambda: trajectory.dense.steps, trajectory.dense)
         self.steps += trajectory.statistics.get("steps", 0)
         assert trajectory.end is not None  # noqa: S101 (engines that follow guards say it)
         t, x = trajectory.end

@@ -187,7 +187,7 @@ def output_times(t_eval: OutputTimes, start: float, end: float) -> Array | None:
         return np.linspace(start, end, count)
     plain = numbers_in_si("t_eval", t_eval, "s")
     try:
-        times = np.asarray(plain, dtype=float)
+        times = np.array(plain, dtype=float)  # that of the caller may change
     except (TypeError, ValueError):
         raise ParameterError(f"t_eval = {t_eval!r} must be a list of times, their number, or 'steps'.") from None
     good = times.ndim == 1 and times.size > 0 and bool(np.isfinite(times).all())
