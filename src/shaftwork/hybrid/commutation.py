@@ -1,4 +1,4 @@
-"""Commutation: diodes and freewheels that take over a current or torque which a change of mode would cut off."""
+"""Commutation: diodes and freewheels that take over a current or torque which a transition would cut off."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sympy import Expr
 
 from shaftwork.components.branches import ACROSS, THROUGH
 from shaftwork.core.errors import NetworkError
-from shaftwork.hybrid.hybrid_state import Change, HybridState, Transition, exceeded
+from shaftwork.hybrid.hybrid_state import EventOutcome, HybridState, Transition, exceeded
 from shaftwork.hybrid.hybrid_transfer import HybridTransfer, mode_anew
 from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, ModeMachine, ModeNames, with_modes
 
@@ -38,7 +38,7 @@ class Commutation:
                     return other, changed
         return plain, {}
 
-    def switched(self, t: float, after: float, state: HybridState, number: int, to: str) -> Transition | None:
+    def switched(self, t: float, after: float, state: HybridState, number: int, to: str) -> EventOutcome | None:
         """A switch changes, with all others whose time it is too, and diodes so that all that is stored goes on.
 
         None where that is not possible: a current is cut off, or a capacitor is charged at once. Of several switches
@@ -57,7 +57,7 @@ class Commutation:
         for new, led in self._keeping(after, state, new_modes, _sets(options, 0), names):
             if not any(self._machines[active.machine].is_one_way for _, active in exceeded(new, after, new)[1]):
                 return new, self._changes(t, modes, changed | led)
-        opens = {k: to for k, to in changed.items() if not self._machines[k].joins(to)}
+        opens = {k: to for k, to in changed.items() if not self._machines[k].is_rigid(to)}
         if not 0 < len(opens) < len(changed):
             return None
         with suppress(NetworkError):  # then each by itself, which says what contradicts what
@@ -65,8 +65,8 @@ class Commutation:
             return new, self._changes(t, modes, opens | led)
         return None
 
-    def _changes(self, t: float, modes: ModeNames, changed: Mapping[int, str]) -> list[Change]:
-        return [Change(t, self._machines[k], modes[k], name) for k, name in changed.items()]
+    def _changes(self, t: float, modes: ModeNames, changed: Mapping[int, str]) -> list[Transition]:
+        return [Transition(t, self._machines[k], modes[k], name) for k, name in changed.items()]
 
     def _keeping(
         self, t: float, state: HybridState, modes: ModeNames, sets: Iterable[dict[int, str]], names: Sequence[str]

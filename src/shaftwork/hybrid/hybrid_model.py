@@ -149,8 +149,8 @@ class HybridModel(Model):
             ends = partial(_ends, state, when)
             x = steady_state(bound, state.x, when, ends=ends) if state.x.size else state.x
             beyond = ends(x)
-            state, changes = event_iteration.run(when, when, state._replace(x=x), None)
-            if not (changes or beyond):
+            state, transitions = event_iteration.run(when, when, state._replace(x=x), None)
+            if not (transitions or beyond):
                 if not math.isfinite(t):
                     warn_of_earlier_levels(bound, state.x, when, state.regime.model.switching)
                 warn_of_held_torques(state, when)

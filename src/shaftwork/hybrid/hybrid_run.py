@@ -25,7 +25,7 @@ from shaftwork.core.notices import warn
 from shaftwork.hybrid.commutation import takeovers
 from shaftwork.hybrid.equation_sets import FOLLOWING, EquationSets
 from shaftwork.hybrid.event_iteration import EventIteration
-from shaftwork.hybrid.hybrid_state import Change, HybridState, Regime, Transition
+from shaftwork.hybrid.hybrid_state import EventOutcome, HybridState, Regime, Transition
 from shaftwork.hybrid.in_place_events import InPlaceEvents, Phase
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, with_modes
@@ -40,14 +40,14 @@ if TYPE_CHECKING:
     from shaftwork.waves.hybrid_waves import WaveRun
 
 CHATTER = ((200, 1e-9), (3000, 1e-6))
-"""So many changes of mode, each within this part of the run of the one before, are chatter. Rebounds come ever faster,
+"""So many transitions, each within this part of the run of the one before, are chatter. Rebounds come ever faster,
 too, before they end: a thousand of them where nearly all speed is given back."""
 SELDOM = max(part for _, part in CHATTER)
 TIGHTEST_RTOL = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
-class Span:
+class Segment:
     """One run of an engine: phases in the same equations.
 
     Args:
@@ -66,12 +66,12 @@ class SharedByRuns:
     Args:
         event_iteration: changes modes.
         timelines: by equations, the instants at which inputs jump or bend.
-        begins: modes and states with which a motion from rest begins, and the changes that lead there.
+        begins: modes and states with which a motion from rest begins, and the transitions that lead there.
     """
 
     event_iteration: EventIteration
     timelines: dict[ModeEquations, Timeline] = field(default_factory=dict)
-    begins: list[Transition] = field(default_factory=list)
+    begins: list[EventOutcome] = field(default_factory=list)
 
 
 class HybridRun:
@@ -94,8 +94,8 @@ class HybridRun:
             key, lambda: SharedByRuns(EventIteration(equation_sets, values, demand.span, equations))
         )
         self.event_iteration: EventIteration = self._shared.event_iteration
-        self.spans: list[Span] = []
-        self.changes: list[Change] = []
+        self.segments: list[Segment] = []
+        self.transitions: list[Transition] = []
         self.jumps: list[Impact] = []
         self.engine, self.why, self.steps = "", "", 0
         self.waves: WaveRun | None = None
@@ -103,11 +103,11 @@ class HybridRun:
         self._duration = demand.span[1] - demand.span[0]
 
     def march(self, initial: Mapping[str, float] | None) -> None:
-        """Go through all phases from the start values, from one change of equations to the next."""
+        """Go through all phases from the start values, from one set of equations to the next."""
         t, end = self.demand.span
         state = self.begin(initial)
         while t < end:
-            t, state = self._span(t, state)
+            t, state = self._segment(t, state)
 
     def begin(self, initial: Mapping[str, float] | None) -> HybridState:
         """The states and modes at the start."""
@@ -115,42 +115,42 @@ class HybridRun:
         if self.event_iteration.transfer.regime(self.equation_sets.first).equations.model.form.waves:
             begins = []  # what leaves the ends before the start is of the run
         if isinstance(initial, Ending):
-            state, changes = self._resumed(initial)
+            state, transitions = self._resumed(initial)
         elif initial is None and begins:
-            state, changes = begins[0]
+            state, transitions = begins[0]
         else:
-            state, changes = self._started(initial)
+            state, transitions = self._started(initial)
             if initial is None:
-                begins.append((state, changes))
+                begins.append((state, transitions))
         if initial and start != 0 and not isinstance(initial, Ending):
             for machine, mode in zip(self.equation_sets.machines, state.regime.modes, strict=True):
                 warn_of_what_may_have_begun(machine.name, machine.modes, mode, start)
-        self.note(start, changes)
+        self.note(start, transitions)
         return state
 
-    def _started(self, initial: Mapping[str, float] | None) -> Transition:
-        """The states and modes at the start, and what changes there; currents may need diodes that conduct."""
+    def _started(self, initial: Mapping[str, float] | None) -> EventOutcome:
+        """The states and modes at the start, and the transitions there; currents may need diodes that conduct."""
         if not initial:
-            return self._joined({}, self._read(initial, {}))
+            return self._going_on({}, self._read(initial, {}))
         readings, failed = list[tuple[int, dict[int, str], HybridState]](), None
         start, closed = self.demand.span[0], self._closed()
-        for joins in [{}, closed] if closed else [{}]:
+        for rigid in [{}, closed] if closed else [{}]:
             try:
-                state = self._read(initial, joins)
+                state = self._read(initial, rigid)
             except ParameterError as error:
                 failed = failed or error
             else:
                 stored = state.stored(start)
-                readings.append((sum(stored[name] != 0 for name in stored.keys() - initial.keys()), joins, state))
+                readings.append((sum(stored[name] != 0 for name in stored.keys() - initial.keys()), rigid, state))
         if readings:  # what is not named rests, if the circuit lets it
-            _, joins, state = min(readings, key=itemgetter(0))
-            return self._joined(joins, state)
-        for joins in takeovers(self.equation_sets.machines, with_modes(self.equation_sets.first, closed)):
+            _, rigid, state = min(readings, key=itemgetter(0))
+            return self._going_on(rigid, state)
+        for rigid in takeovers(self.equation_sets.machines, with_modes(self.equation_sets.first, closed)):
             with suppress(ParameterError, SimulationError, NetworkError):
-                transition = self._joined(closed | joins, self._read(initial, closed | joins))
-                stored = transition[0].stored(start)
+                outcome = self._going_on(closed | rigid, self._read(initial, closed | rigid))
+                stored = outcome[0].stored(start)
                 if all(abs(stored.get(k, v) - v) <= NO_IMPACT * max(abs(v), 1.0) for k, v in initial.items()):
-                    return transition
+                    return outcome
         assert failed is not None  # noqa: S101 (as no reading is left)
         raise failed
 
@@ -162,14 +162,14 @@ class HybridRun:
         regime = self.event_iteration.transfer.regime(self.equation_sets.first)
         rest = np.zeros(len(regime.model.states))
         modes = regime.equations.first_modes(self._after(regime), rest, regime.p)
-        joins = {k: modes[k] for k in switches if modes[k] != self.equation_sets.first[k]}
-        return joins if self.event_iteration.transfer.possible(with_modes(self.equation_sets.first, joins)) else {}
+        rigid = {k: modes[k] for k in switches if modes[k] != self.equation_sets.first[k]}
+        return rigid if self.event_iteration.transfer.possible(with_modes(self.equation_sets.first, rigid)) else {}
 
-    def _read(self, initial: Mapping[str, float] | None, joins: Mapping[int, str]) -> HybridState:
-        """Start values in the equations in which some machines join something."""
+    def _read(self, initial: Mapping[str, float] | None, rigid: Mapping[int, str]) -> HybridState:
+        """Start values in the equations in which some machines are rigid."""
         start, regime = (
             self.demand.span[0],
-            self.event_iteration.transfer.regime(with_modes(self.equation_sets.first, joins)),
+            self.event_iteration.transfer.regime(with_modes(self.equation_sets.first, rigid)),
         )
         equations = regime.equations
         if isinstance(initial, Mapping) and initial and start != 0:
@@ -181,11 +181,11 @@ class HybridRun:
         """A time just after the start."""
         return self.timeline(regime.equations, regime.p).sides(self.demand.span[0])[1]
 
-    def _joined(self, joins: Mapping[int, str], read: HybridState) -> Transition:
-        """The modes that go on from a start that has been read where some machines join something, and the changes."""
+    def _going_on(self, rigid: Mapping[int, str], read: HybridState) -> EventOutcome:
+        """The modes that go on from a start that has been read where some machines are rigid, and the transitions."""
         after = self._after(read.regime)
         return self.event_iteration.run(
-            self.demand.span[0], after, self.event_iteration.in_start_modes(after, read.x, joins), None
+            self.demand.span[0], after, self.event_iteration.in_start_modes(after, read.x, rigid), None
         )
 
     def _beside_waves(self, regime: Regime, x: Array, start: Any) -> Array:
@@ -197,19 +197,19 @@ class HybridRun:
         self.waves = WaveRun(regime.bound, start, self.demand.span)
         return np.concatenate([x, self.waves.arriving(self.demand.span[0])])
 
-    def _resumed(self, ending: Ending) -> Transition:
-        """The states and modes in which another motion ended, and what changes at that instant."""
+    def _resumed(self, ending: Ending) -> EventOutcome:
+        """The states and modes in which another motion ended, and the transitions at that instant."""
         start, first = self.demand.span[0], self.event_iteration.transfer.regime(self.equation_sets.first)
         x = self._beside_waves(first, np.zeros(len(first.model.states)), ending.waves)
-        state, changes = (
+        state, transitions = (
             self.event_iteration.transfer.resumed(ending.beside(first.equations.arriving(x))),
-            list[Change](),
+            list[Transition](),
         )
         after = self._instants(state).sides(start)[1]
         if after != ending.read and state.regime.form.has_impulses:
-            state, changes, _ = self.event_iteration.impacts.jumped(start, state, ending.read, after)
+            state, transitions, _ = self.event_iteration.impacts.jumped(start, state, ending.read, after)
         state, further = self.event_iteration.run(start, after, state, None)
-        return state, [*changes, *further]
+        return state, [*transitions, *further]
 
     def choose(self) -> tuple[str, str]:
         """The engine for the first phase, and why."""
@@ -236,23 +236,23 @@ class HybridRun:
     def _instants(self, state: HybridState) -> Timeline:
         return self.timeline(state.regime.equations, state.regime.p)
 
-    def note(self, t: float, changes: list[Change]) -> None:
-        """Put down what has changed at a time.
+    def note(self, t: float, transitions: list[Transition]) -> None:
+        """Put down the transitions at a time.
 
         Raises:
-            SimulationError: changes follow each other without time going on.
+            SimulationError: transitions follow each other without time going on.
         """
-        if not changes:
+        if not transitions:
             return
-        passed = (t - self.changes[-1].time) / self._duration if self.changes else 1.0
-        self.changes += changes
+        passed = (t - self.transitions[-1].time) / self._duration if self.transitions else 1.0
+        self.transitions += transitions
         if passed >= SELDOM:
             self._soon = [0] * len(CHATTER)
             return
         for number, (most, part) in enumerate(CHATTER):
             self._soon[number] = self._soon[number] + 1 if passed < part else 0
             if self._soon[number] > most:
-                last = changes[-1]
+                last = transitions[-1]
                 raise SimulationError(
                     f"{type(last.machine.part.component).__name__} '{last.machine.name}' changes again and again "
                     f"between '{last.before}' and '{last.after}' at t = {t:.9g} s, {most} times with hardly any time "
@@ -276,12 +276,12 @@ class HybridRun:
             t_eval=self._outputs(t, end),
             max_steps=demand.max_steps - self.steps,
             earlier_steps=self.steps,
-            react=in_place,
+            past_guards=in_place,
             progress=demand.progress,
         )
 
-    def _span(self, t: float, state: HybridState) -> tuple[float, HybridState]:
-        """One run of the engine, up to other equations or an instant at which an input jumps; what goes on then."""
+    def _segment(self, t: float, state: HybridState) -> tuple[float, HybridState]:
+        """One run of an engine, up to other equations or an instant at which an input jumps; what goes on then."""
         regime, form = state.regime, state.regime.form
         bind = partial(regime.equations.bound, regime.p)
         refuse_vanishing(form, bind, lambda: np.array([t]), lambda _: state.x[None])
@@ -294,7 +294,7 @@ class HybridRun:
         if self.demand.t_eval is not None and t in trajectory.t[-1:] and t < self.demand.span[1]:
             # an output at an event belongs to the next phase, which has it too
             trajectory = replace(trajectory, t=trajectory.t[:-1], x=trajectory.x[:-1])
-        self.spans.append(Span(trajectory, tuple(in_place.phases)))
+        self.segments.append(Segment(trajectory, tuple(in_place.phases)))
         return t, self._next_state(t, x[: state.x.size], in_place, trajectory.met)
 
     def _next_state(self, t: float, x: Array, in_place: InPlaceEvents, met: int | None) -> HybridState:
@@ -302,19 +302,19 @@ class HybridRun:
         state = HybridState(in_place.regime, x, in_place.bands)
         sides = self._instants(state).sides(t)
         if met is not None and in_place.beyond is not None and sides == (t, t):
-            state, changes = in_place.beyond
-            self.note(t, changes)
+            state, transitions = in_place.beyond
+            self.note(t, transitions)
             return state
         if sides != (t, t) and state.regime.form.has_impulses:
-            state, changes, at_once = self.event_iteration.impacts.jumped(t, state, *sides)
-            self.note(t, changes)
+            state, transitions, at_once = self.event_iteration.impacts.jumped(t, state, *sides)
+            self.note(t, transitions)
             self.jumps.append(at_once)
-            met = None if changes else met
+            met = None if transitions else met
         if met is None and t >= self.demand.span[1]:
             return state
         after = self._instants(state).sides(t)[1]  # those of other equations, where a jump has led there
-        state, changes = self.event_iteration.run(t, after, state, met)
-        self.note(t, changes)
+        state, transitions = self.event_iteration.run(t, after, state, met)
+        self.note(t, transitions)
         return state
 
     def _outputs(self, t: float, end: float) -> Array | None:
@@ -327,7 +327,7 @@ class HybridRun:
     def _followed(self, t: float, state: HybridState) -> tuple[Trajectory, InPlaceEvents]:
         """One run of the engine; where heyoka cannot go on, or a stiff phase is long, another engine begins it anew."""
         in_place = InPlaceEvents(self.event_iteration, state, t, self.note, self._suits_heyoka)
-        problem, noted, soon = self._problem(t, state, in_place), len(self.changes), [*self._soon]
+        problem, noted, soon = self._problem(t, state, in_place), len(self.transitions), [*self._soon]
         if not problem.x0.size:
             still = without_states(problem, state.regime.model.degree)
             return replace(still, end=(problem.t_end, problem.x0)), in_place
@@ -339,10 +339,10 @@ class HybridRun:
             return self._solve(problem, name, why), in_place
 
         def anew(engine: str, steps: int, because: str) -> tuple[Trajectory, InPlaceEvents]:
-            del self.changes[noted:]
+            del self.transitions[noted:]
             self._soon = [*soon]
             events = InPlaceEvents(self.event_iteration, state, t, self.note)
-            return self._solve(changed(problem, react=events, max_steps=steps), engine, because), events
+            return self._solve(changed(problem, past_guards=events, max_steps=steps), engine, because), events
 
         steps = min(most, choice.patience(problem)) if stiff else most
         try:

@@ -38,8 +38,8 @@ Excess = tuple[float, ActiveGuard]
 """How far a guard is beyond its limit, or will be."""
 
 
-class Change(NamedTuple):
-    """A change of mode: when in s, of which machine, from which mode to which; or a rebound, back to the one before.
+class Transition(NamedTuple):
+    """When in s which machine passes from which mode to which; or a rebound, back to the mode before.
 
     With an impact speeds jump; sources of speed have given energy at once, and gears have lost some, in J by part.
     """
@@ -56,10 +56,10 @@ class Change(NamedTuple):
 
 def differences(
     t: float, machines: Sequence[ModeMachine], before: ModeNames, after: ModeNames, besides: Collection[int] = ()
-) -> list[Change]:
-    """The changes at a time in s from modes to others, in the order of the machines, but for some of these."""
+) -> list[Transition]:
+    """The transitions at a time in s from modes to others, in the order of the machines, but for some of these."""
     triples = enumerate(zip(machines, before, after, strict=True))
-    return [Change(t, *names) for k, names in triples if k not in besides and names[1] != names[2]]
+    return [Transition(t, *names) for k, names in triples if k not in besides and names[1] != names[2]]
 
 
 class Regime:
@@ -79,8 +79,8 @@ class Regime:
         """Rates and guards at an instant; the guards alone; the guards around an instant, by the `moves` of states."""
         self.sizes, self.sides, self.watched = equations.sizes(p), equations.sides(modes), equations.watched(modes)
         """Nominal size of each state; on which side each guard is met; everything that may end one of the modes."""
-        self.successors: dict[int, Any] = {}
-        """By guard, where it leads in place; told when it is first met."""
+        self.in_place: dict[int, Any] = {}
+        """By guard, the in-place transition to which it leads, or None; found when it is first met."""
 
     @property
     def model(self) -> Model:
@@ -251,14 +251,14 @@ class HybridState(NamedTuple):
         return self._replace(x=self.x + step * np.array(self.course(t)[2])) if step else self
 
 
-Transition = tuple[HybridState, list[Change]]
-"""The state that follows at an instant, and the changes of mode that lead there."""
+EventOutcome = tuple[HybridState, list[Transition]]
+"""The hybrid state that goes on after an event, and the transitions that lead there."""
 
 
 def exceeded(
     state: HybridState,
     t: float,
-    ended: HybridState,
+    before: HybridState,
     idle: Sequence[ActiveGuard] = (),
     *,
     in_order: bool = False,
@@ -269,8 +269,8 @@ def exceeded(
     Args:
         state: modes and states.
         t: s.
-        ended: the state before any change.
-        idle: guards that were met here already and change nothing.
+        before: the state before any transition.
+        idle: guards that were met here already and lead to no transition.
         in_order: whether the first one will be taken, and not the worst.
         again: whether modes have come back.
     """
@@ -278,8 +278,8 @@ def exceeded(
     beside, now = regime.course(*regime.beside(here)), here[3]
     bands = regime.bands(here, beside[3])
     wide = bands
-    if ended.bands and ended.regime.equations is regime.equations:
-        wide = list(map(max, bands, ended.bands))
+    if before.bands and before.regime.equations is regime.equations:
+        wide = list(map(max, bands, before.bands))
     beyond, on_limit, clear = [], [], [0.0] * len(now)
     for active in regime.watched:
         excess = active.side * now[active.guard]
@@ -351,7 +351,7 @@ def passes_limit(state: HybridState, t: float) -> bool:
 
 
 def resting(state: HybridState, t: float) -> dict[int, str]:
-    """Elements that slip, with no speed across them as others hold their ends, and the modes in which they hold."""
+    """Machines that slip, with no speed across them as others hold their ends, and the modes in which they hold."""
     regime, slipping = state.regime, dict[int, ActiveGuard]()
     for active in regime.watched:
         k = active.machine

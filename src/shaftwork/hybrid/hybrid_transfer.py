@@ -64,18 +64,18 @@ class HybridTransfer:
             return False
         return True
 
-    def joinable(self, modes: ModeNames, joins: Mapping[int, str]) -> Mapping[int, str]:
+    def compatible(self, modes: ModeNames, holding: Mapping[int, str]) -> Mapping[int, str]:
         """Of machines and the modes in which they hold all that agree, the first before the others.
 
         Beside a prescribed speed that is zero by now not all of them can.
         """
-        if self.possible(with_modes(modes, joins)):
-            return joins
-        joined: dict[int, str] = {}
-        for k, name in joins.items():
-            if self.possible(with_modes(modes, {**joined, k: name})):
-                joined[k] = name
-        return joined
+        if self.possible(with_modes(modes, holding)):
+            return holding
+        compatible: dict[int, str] = {}
+        for k, name in holding.items():
+            if self.possible(with_modes(modes, {**compatible, k: name})):
+                compatible[k] = name
+        return compatible
 
     def with_stored(self, modes: ModeNames, t: float, stored: Mapping[str, float]) -> HybridState:
         """A state in the given modes that takes up what was stored, with the inputs of a time in s.
@@ -139,7 +139,7 @@ def refuse_beyond(state: HybridState, t: float) -> None:
     """Refuse a start beyond a rigid limit, where no motion leads.
 
     Args:
-        state: in the modes in which nothing is joined.
+        state: in the modes in which no machine is rigid.
         t: s.
 
     Raises:

@@ -23,8 +23,8 @@ from shaftwork.sensitivities.differentiation import Differentiated
 if TYPE_CHECKING:
     from shaftwork.hybrid.equation_sets import EquationSets
     from shaftwork.hybrid.hybrid_model import HybridModel
-    from shaftwork.hybrid.hybrid_run import HybridRun, Span
-    from shaftwork.hybrid.hybrid_state import Change
+    from shaftwork.hybrid.hybrid_run import HybridRun, Segment
+    from shaftwork.hybrid.hybrid_state import Transition
     from shaftwork.hybrid.modes.mode_equations import ModeEquations
     from shaftwork.hybrid.modes.mode_machines import ModeNames
 
@@ -134,14 +134,14 @@ class DifferentiatedMotion:
     Args:
         solution: the motion, to be read.
         legs: its smooth spans.
-        changes: of modes, in their order.
+        transitions: in their order.
         start: what it starts from, in the equations in which nothing is joined; None where no part changes its mode.
         equation_sets: the sets of equations, likewise.
     """
 
     solution: Solution
     legs: tuple[Leg, ...]
-    changes: tuple[Change, ...] = ()
+    transitions: tuple[Transition, ...] = ()
     start: Leg | None = None
     equation_sets: EquationSets | None = None
 
@@ -176,8 +176,8 @@ def _through_phases(model: HybridModel, span: tuple[float, float], initial: Give
         model.equation_sets, {}, Demand(span, rtol, None, None, "auto", Problem.max_steps, None), by_combination=True
     )
     run.march(initial)
-    legs, changes = tuple(_legs_of_run(run)), tuple(run.changes)
-    return DifferentiatedMotion(solution(run, model.name), legs, changes, _start(run, initial), model.equation_sets)
+    legs, transitions = tuple(_legs_of_run(run)), tuple(run.transitions)
+    return DifferentiatedMotion(solution(run, model.name), legs, transitions, _start(run, initial), model.equation_sets)
 
 
 def _start(run: HybridRun, initial: Given) -> Leg:
@@ -216,7 +216,7 @@ def _refuse_impulses(motion: DifferentiatedMotion) -> None:
 def _legs_of_run(run: HybridRun) -> Iterator[Leg]:
     """The legs of a motion through phases."""
     for span, end in zip(
-        run.spans, [*(span.phases[0].start for span in run.spans[1:]), run.demand.span[1]], strict=True
+        run.segments, [*(span.phases[0].start for span in run.segments[1:]), run.demand.span[1]], strict=True
     ):
         starts = [phase.start for phase in span.phases]
         for phase, (start, stop) in zip(span.phases, pairwise([*starts, end]), strict=True):
@@ -227,7 +227,7 @@ def _legs_of_run(run: HybridRun) -> Iterator[Leg]:
                 yield replace(leg, equations=equations, modes=phase.regime.modes)
 
 
-def _states(span: Span) -> Callable[[Array], Array]:
+def _states(span: Segment) -> Callable[[Array], Array]:
     """Those of the equations, without their clocks."""
     size, dense = len(span.phases[0].regime.model.states), span.trajectory.dense
     return lambda times: dense(times)[:, :size]

@@ -68,9 +68,9 @@ class HybridEnsemble(Ensemble):
         met = [active for active in equations.watched(group.modes) if active.guard == guard]
         if len(met) != 1 or met[0].leave.rebound is not None:
             return []
-        ended, number, count = met[0], met[0].machine, group.lanes.size
-        names = [ended.leave.to] * count
-        if not ended.leave.to:
+        crossed, number, count = met[0], met[0].machine, group.lanes.size
+        names = [crossed.leave.to] * count
+        if not crossed.leave.to:
             before, parameters = group.modes[number], p[: len(equations.model.parameters)]
             starts = zip(group.t.tolist(), group.x.T, parameters.T, strict=True)
             names = [equations.start_of(number, before, *start) for start in starts]

@@ -54,18 +54,18 @@ class HeldRows:
     """
 
     def __init__(self, rows: Rows, laws: Sequence[tuple[int, set[int]]], groups: Iterable[Collection[int]]) -> None:
-        self.joins: Entries = {}
+        self.projection: Entries = {}
         """P, by places of states."""
         self.reactions: Entries = {}
         """R, by branch and place of a state."""
         rates, through = [*rows.rates], dict(rows.through)
         for group in map(sorted, groups):
             for place in group:
-                rates[place] = _product(self.joins, "joins", place, group, rows.rates)
+                rates[place] = _product(self.projection, "joins", place, group, rows.rates)
             for law, places in laws:
                 if not places.isdisjoint(group):
                     through[law] += _product(self.reactions, "reaction", law, group, rows.rates)
-        self.symbols = (*self.joins.values(), *self.reactions.values())
+        self.symbols = (*self.projection.values(), *self.reactions.values())
         """Parameters of the rows behind those of the network."""
         parameters = (*rows.parameters, *self.symbols)
         self.rows = replace(rows, parameters=parameters, rates=tuple(rates), through=through)
@@ -133,15 +133,15 @@ class Joints:
             return
         reactions, alike = _reactions(G, B), _alike(followers, size)
         self._B, self._reactions, self._alike = Factor(B), Factor(reactions), Factor(alike)
-        self._joined = sparse.csr_array(alike @ (sparse.eye_array(size, format="csr") + B @ reactions))
+        self._projection = sparse.csr_array(alike @ (sparse.eye_array(size, format="csr") + B @ reactions))
         self._part = part
 
     @cached_property
     def moving(self) -> LinearPart:
         """The equations with what holds moving as one, to which its own laws add nothing; explicit rows need none."""
-        part, joined, alike = self._part, self._joined, self._alike.sparse
+        part, P, alike = self._part, self._projection, self._alike.sparse
         others = sparse.diags_array(np.where(np.isin(np.arange(part.B.shape[1]), self.places), 0.0, 1.0))
-        return replace(part, A=joined @ part.A, B=joined @ part.B @ others, B1=joined @ part.B1, C=part.C @ alike)
+        return replace(part, A=P @ part.A, B=P @ part.B @ others, B1=P @ part.B1, C=part.C @ alike)
 
     def reactions(self, rates: Array) -> Array:
         """(h,) or (h, k): what cancels rates (n,) or (n, k) in the speeds across."""
@@ -155,17 +155,17 @@ class Joints:
         """(k,) the numbers of the symbols in rows: those of P and of R."""
         number = {branch: k for k, branch in enumerate(self._branches)}
         entries = np.zeros(len(rows.symbols))
-        entries[: len(rows.joins)] = _at(self._joined, [*rows.joins])
+        entries[: len(rows.projection)] = _at(self._projection, [*rows.projection])
         reactions = [
             (k, (number[branch], place)) for k, (branch, place) in enumerate(rows.reactions) if branch in number
         ]
-        entries[[len(rows.joins) + k for k, _ in reactions]] = _at(
+        entries[[len(rows.projection) + k for k, _ in reactions]] = _at(
             self._reactions.sparse, [place for _, place in reactions]
         )
         return entries
 
     def met(self, x: Array) -> Array:
-        """(n,) the states after an inelastic impact that joins what is held: every momentum is kept."""
+        """(n,) the states after an inelastic impact of what is held: every momentum is kept."""
         return self.alike(x + self._B @ self.reactions(x))
 
 

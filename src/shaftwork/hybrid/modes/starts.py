@@ -81,10 +81,10 @@ class MachineReadings:
     def _start(self, number: int, besides: str, t: float, shown: Sequence[Any]) -> str:
         modes = self._machines[number].modes
         first, symbols = self._firsts[number], self._symbols[number]
-        holds = starts_of(modes, symbols)(t, *shown[first : first + 2 + len(symbols)])
-        if holds is None:
+        conditions = starts_of(modes, symbols)(t, *shown[first : first + 2 + len(symbols)])
+        if conditions is None:
             raise no_value(t, in_words(self._machines[number].part, Tuple(*(mode.starts for mode in modes.options))))
-        pairs = zip(modes.options, holds, strict=True)
+        pairs = zip(modes.options, conditions, strict=True)
         return next((mode.name for mode, is_true in pairs if is_true and mode.name != besides), "")
 
     @cached_property
