@@ -14,9 +14,6 @@ from shaftwork.hybrid.hybrid_state import EventOutcome, HybridState, Transition,
 from shaftwork.hybrid.hybrid_transfer import HybridTransfer, mode_anew
 from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, ModeMachine, ModeNames, with_modes
 
-MOST = 500
-"""So many sets of diodes are tried at one instant, the smallest first: all of a circuit with eight of them."""
-
 
 class Commutation:
     """Finds what diodes and freewheels do where currents and torques would be cut off.
@@ -96,9 +93,10 @@ def takeovers(machines: Sequence[ModeMachine], modes: ModeNames) -> Iterator[dic
     return _sets(_led(machines, modes, ACROSS), 1)
 
 
-def _sets(options: Sequence[tuple[int, str]], least: int) -> Iterator[dict[int, str]]:
+def _sets(options: Sequence[tuple[int, str]], least: int, most: int = 500) -> Iterator[dict[int, str]]:
+    """Sets of at least so many options, the smallest first, and at most so many of them: all of eight diodes."""
     sizes = range(least, len(options) + 1)
-    return islice(chain.from_iterable(map(dict, combinations(options, size)) for size in sizes), MOST)
+    return islice(chain.from_iterable(map(dict, combinations(options, size)) for size in sizes), most)
 
 
 def _led(machines: Sequence[ModeMachine], modes: ModeNames, when: Expr) -> list[tuple[int, str]]:

@@ -26,10 +26,6 @@ from shaftwork.hybrid.impacts.impacts import Impacts
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import ActiveGuard, ModeNames, limited, with_modes
 
-MOST_AT_ONCE = 2000
-"""So many transitions within one instant have no end: of two rigid flanks without a gap between them, say."""
-MOST_REPEATS = 2
-
 
 class EventIteration:
     """Changes modes at an instant.
@@ -152,12 +148,21 @@ class EventIteration:
             met.append(named)
         return sorted(met, key=state.regime.watched.index)
 
-    def _consistent(self, t: float, after: float, state: HybridState, first: ActiveGuard | None) -> EventOutcome:
+    def _consistent(
+        self,
+        t: float,
+        after: float,
+        state: HybridState,
+        first: ActiveGuard | None,
+        most: tuple[int, int] = (2000, 2),
+    ) -> EventOutcome:
         """Modes that are consistent with the motion that follows, by one transition after another; see `run`.
 
         Args:
             t, after, state: as there.
             first: the guard to begin with, or None.
+            most: so many transitions, or modes that have come back, have no end: of two rigid flanks without a gap
+                between them, say. After the first time that modes come back guards are taken in their order.
         """
         transitions: list[Transition] = []
         idle: list[ActiveGuard] = []
@@ -181,7 +186,7 @@ class EventIteration:
             impact = bool(latest) and latest[0].impact
             again = bool(latest) and not impact and state.regime.modes in seen
             repeats += again
-            if repeats > MOST_REPEATS or len(transitions) > MOST_AT_ONCE:
+            if len(transitions) > most[0] or repeats > most[1]:
                 raise _endless(t, transitions, blocked)
             if again or impact:
                 seen.clear()

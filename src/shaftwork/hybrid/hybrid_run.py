@@ -43,7 +43,6 @@ CHATTER = ((200, 1e-9), (3000, 1e-6))
 """So many transitions, each within this part of the run of the one before, are chatter. Rebounds come ever faster,
 too, before they end: a thousand of them where nearly all speed is given back."""
 SELDOM = max(part for _, part in CHATTER)
-TIGHTEST_RTOL = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
@@ -359,7 +358,8 @@ class HybridRun:
         self, problem: Problem, name: str, why: str, solver: Callable[[Problem], Trajectory] | None = None
     ) -> Trajectory:
         share, loosest = FOLLOWING[name]
-        tight = max(min(share * problem.rtol, loosest), min(problem.rtol, TIGHTEST_RTOL))
+        # nearer to rounding than this no engine gets more exact
+        tight = max(min(share * problem.rtol, loosest), min(problem.rtol, 1e-14))
         if tight != problem.rtol:
             problem = changed(problem, rtol=tight, atol=problem.atol * (tight / problem.rtol))
         trajectory = choice.solve(problem, name, why)[0] if solver is None else solver(problem)

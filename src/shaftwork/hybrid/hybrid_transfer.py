@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 
 from shaftwork.core.errors import NetworkError, ParameterError, SimulationError
 from shaftwork.formulation.value_diagnosis import jamming
-from shaftwork.hybrid.consistency import AHEAD_OF_RUN, ROUNDINGS
+from shaftwork.hybrid.consistency import time_scales
 from shaftwork.hybrid.equation_sets import EquationSets
 from shaftwork.hybrid.hybrid_state import HybridState, Regime
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import ModeNames, with_modes
 from shaftwork.hybrid.modes.starts import begins_anew
 from shaftwork.pipeline.motion_start import Ending
-
-BEYOND = 1e-6
-"""How far in rad a motion may start beyond a rigid limit: errors and printed digits of another run leave so much."""
 
 
 class HybridTransfer:
@@ -38,7 +34,7 @@ class HybridTransfer:
     ) -> None:
         self._equation_sets, self._values, self._equations_of = equation_sets, dict(values), equations_of
         self.first, self.machines = equation_sets.first, equation_sets.machines
-        self._times = ROUNDINGS * math.ulp(max(map(abs, span))), AHEAD_OF_RUN * (span[1] - span[0])
+        self._times = time_scales(span)
         self._regimes: dict[ModeNames, Regime] = {}
 
     def regime(self, modes: ModeNames) -> Regime:
@@ -135,12 +131,13 @@ def mode_anew(state: HybridState, t: float, number: int) -> str:
     )
 
 
-def refuse_beyond(state: HybridState, t: float) -> None:
+def refuse_beyond(state: HybridState, t: float, tolerated: float = 1e-6) -> None:
     """Refuse a start beyond a rigid limit, where no motion leads.
 
     Args:
         state: in the modes in which no machine is rigid.
         t: s.
+        tolerated: how far beyond in rad: errors and printed digits of another run leave so much.
 
     Raises:
         ParameterError: names the part, its twist and the limit.
@@ -149,7 +146,7 @@ def refuse_beyond(state: HybridState, t: float) -> None:
     now = regime.limits(t, state.x.tolist())
     for active in regime.watched:
         machine, beyond = regime.machines[active.machine], active.side * now[active.guard]
-        if active.leave.rebound is None or not beyond > BEYOND:
+        if active.leave.rebound is None or not beyond > tolerated:
             continue
         limit, slope = regime.twist_limit(active.machine, active.leave)
         raise ParameterError(

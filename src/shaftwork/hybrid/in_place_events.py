@@ -16,9 +16,6 @@ from shaftwork.hybrid.hybrid_state import EventOutcome, HybridState, Regime, Tra
 from shaftwork.hybrid.modes.mode_machines import ActiveGuard, ModeMachine, is_same, with_modes
 from shaftwork.integrate.problem import Reset, SeriesError
 
-LATE = 1e4
-"""Of so many roundings of the time a guard may be late that is met together with another one."""
-
 
 class Phase(NamedTuple):
     """A span of time in which no mode changes.
@@ -136,8 +133,14 @@ class InPlaceEvents:
         self.beyond = outcome  # other equations, or an impact in these
         return None
 
-    def refuse_missed(self, met: int | None, t: float, x: Array) -> None:
+    def refuse_missed(self, met: int | None, t: float, x: Array, late: float = 1e4) -> None:
         """Fail where another guard has been beyond its limit for longer than rounding of the time explains.
+
+        Args:
+            met: the guard at which the engine has stopped, or None.
+            t: time, s.
+            x: states.
+            late: so many times as far as rounding moves the time, a guard may be late that is met with another one.
 
         Raises:
             SeriesError: the engine has not seen it.
@@ -145,7 +148,7 @@ class InPlaceEvents:
         """
         regime, bands = self.regime, self.bands
         here = regime.course(t, x[: self._size].tolist())
-        now, before = here[3], regime.limits(*regime.later(here, -LATE * regime.tick))
+        now, before = here[3], regime.limits(*regime.later(here, -late * regime.tick))
         if any(map(math.isnan, now)):
             error = regime.equations.without_value(regime.p, regime.modes, np.array([t]), np.array([here[1]]))
             if error is not None:

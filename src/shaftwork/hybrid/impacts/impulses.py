@@ -26,8 +26,6 @@ from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import ModeNames, with_modes
 from shaftwork.numerics.tolerances import EPS
 
-MOST_STAGES = 100
-"""So many times gears may come to rest in one impact."""
 NOTHING_OF = ROUNDINGS * EPS
 """What rounding leaves of speeds and impulses, as part of the largest."""
 
@@ -83,20 +81,25 @@ class Impulses:
         return ImpactStart(state, t, state.stored(t), speeds)
 
     def stages(
-        self, t: float, start: ImpactStart, outcome: Callable[[ImpactStart, Sequence[ImpactStage]], ImpulseOutcome]
+        self,
+        t: float,
+        start: ImpactStart,
+        outcome: Callable[[ImpactStart, Sequence[ImpactStage]], ImpulseOutcome],
+        most: int = 100,
     ) -> tuple[ImpactStage, ...]:
         """All parts of an impulse, of which the last leads to its end.
 
         Args:
             t: time after it in s at which inputs are read.
             start: before it.
-            blow: the rest of it from a start on, all in the modes that gears have there, and after what stages.
+            outcome: of the rest of it from a start on, all in the modes that gears have there, and after what stages.
+            most: so many times gears may come to rest in it.
 
         Raises:
             SimulationError: gears come to rest again and again.
         """
         stages: list[ImpactStage] = []
-        while len(stages) < MOST_STAGES:
+        while len(stages) < most:
             start, rest = self._consistent(t, start, lambda begun: outcome(begun, stages))
             share, number = min(self._coming_to_rest(t, start, rest.after), default=(1.0, -1))
             stages.append(ImpactStage(start, rest, share))

@@ -33,12 +33,8 @@ from shaftwork.codegen.array_form.matrices import LinearPart
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.formulation.explicit_rows import Rows
 from shaftwork.formulation.form import StateForm
+from shaftwork.network.graph import GROUND
 from shaftwork.numerics.tolerances import SAME
-
-LARGEST_GROUP = 8
-"""States that such laws may connect: each of their rows has as many terms. With 15, rows take twenty times as long to
-compile as matrices, and run slower."""
-FRAME = -1
 
 Entries = dict[tuple[int, int], Symbol]
 """Symbols in place of the entries of a matrix, by row and column."""
@@ -83,7 +79,9 @@ def held_places(form: StateForm, link: int) -> set[int]:
     return {place for place, tree in enumerate(form.across_states) if tree in members}
 
 
-def groups(form: StateForm, laws: Iterable[int], others: Iterable[Collection[int]]) -> list[set[int]] | None:
+def groups(
+    form: StateForm, laws: Iterable[int], others: Iterable[Collection[int]], largest: int = 8
+) -> list[set[int]] | None:
     """The states that laws connect, or None where rows are not the place for what holds.
 
     They are where no machine rests because others hold both of its ends: as a rule, each holds inertias of its own. Who
@@ -93,18 +91,20 @@ def groups(form: StateForm, laws: Iterable[int], others: Iterable[Collection[int
         form: of the equations in which nothing holds.
         laws: branches of what may hold.
         others: places of states between which something else may become rigid.
+        largest: so many states may be connected: each of their rows has as many terms. With 15, rows take twenty times
+            as long to compile as matrices, and run slower.
     """
     graph = nx.Graph()
     for link in laws:
         places = held_places(form, link)
-        ends = (*places, FRAME)[:2]
+        ends = (*places, GROUND)[:2]
         if not 0 < len(places) <= 2 or graph.has_edge(*ends):
             return None
         graph.add_edge(*ends)
-    sets = [set(group) for group in nx.connected_components(graph.subgraph([n for n in graph if n != FRAME]))]
+    sets = [set(group) for group in nx.connected_components(graph.subgraph([n for n in graph if n != GROUND]))]
     rigid = (*others, *(held_places(form, link) for link in form.dependent_across))
     taken = set[int]().union(*rigid)
-    if not nx.is_forest(graph) or any(len(group) > LARGEST_GROUP or not taken.isdisjoint(group) for group in sets):
+    if not nx.is_forest(graph) or any(len(group) > largest or not taken.isdisjoint(group) for group in sets):
         return None
     return sets
 

@@ -38,15 +38,8 @@ from shaftwork.pipeline.prepared import Prepared
 
 KEPT = 64
 """Parameter vectors whose matrices are kept."""
-SAMPLES = 64
-"""Times at which a guard is looked at to know its size."""
-SOON, MORE = 1e-9, 1e3
-"""What changes within this part of a phase by more than its largest value over this is nothing but rounding."""
 CLOCK = 1e-20
 """What a clock counts: heyoka's tolerance is relative to the largest state, which this must never be."""
-
-FEW_CALLS = 50
-"""Calls of a right-hand side that are not worth code of its own."""
 
 RightSide = Callable[[float, Array], Array]
 GuardValues = Callable[[Array, Array], Array]
@@ -295,8 +288,8 @@ class ModeEquations:
         """The right-hand side and what engines find out about it, for all phases with these parameters."""
         return self._rates_by_p(p.tobytes(), lambda: (self._right_side(p), {}))
 
-    def _right_side(self, p: Array) -> RightSide:
-        """In scalar code where there is some: that of `motion`, until it is asked for often enough to have its own."""
+    def _right_side(self, p: Array, few_calls: int = 50) -> RightSide:
+        """In scalar code where there is some: that of `motion`, as a few calls are not worth code of their own."""
         scalar = self.whole.scalar
         if scalar is None:
             return self.bound(p).rhs
@@ -304,7 +297,7 @@ class ModeEquations:
         scalar_rates = cache(lambda: scalar.bind(values))
 
         def rates(t: float, x: Array) -> Array:
-            if next(calls) < FEW_CALLS:
+            if next(calls) < few_calls:
                 return np.array(motion(t, x.tolist())[0])
             return scalar_rates()(t, x)
 
@@ -315,17 +308,35 @@ class ModeEquations:
         """The right-hand side in scalar code, where there are rows."""
         return self.model.scalar
 
-    def clock_sizes(self, span: tuple[float, float], x: Array, p: Array) -> Array:
-        """(clocks,) the size of each clock over a phase, as far as the time alone tells."""
+    def clock_sizes(
+        self,
+        span: tuple[float, float],
+        x: Array,
+        p: Array,
+        *,
+        samples: int = 64,
+        soon: float = 1e-9,
+        most: float = 1e-3,
+    ) -> Array:
+        """(clocks,) the size of each clock over a phase, as far as the time alone tells.
+
+        Args:
+            span: start and end of the phase, s.
+            x: (n,) its states.
+            p: parameters.
+            samples: times at which guards are looked at.
+            soon: what changes within this part of the phase by more than
+            most: this part of its largest value, is nothing but rounding.
+        """
         if not self.clocks:
             return np.empty(0)
         length = span[1] - span[0]
-        times = np.linspace(span[0], span[1] - SOON * length, SAMPLES)
-        pairs = np.concatenate([times, times + SOON * length])
+        times = np.linspace(span[0], span[1] - soon * length, samples)
+        pairs = np.concatenate([times, times + soon * length])
         values = self.guards(p)(pairs, np.tile(x, (pairs.size, 1)))[:, list(self.clocks)]
-        largest, changes = np.abs(values).max(axis=0), np.abs(values[:SAMPLES] - values[SAMPLES:]).max(axis=0)
+        largest, changes = np.abs(values).max(axis=0), np.abs(values[:samples] - values[samples:]).max(axis=0)
         # what is another number at once is rounding, and an engine that followed it would not get on
-        return CLOCK * np.where(largest > MORE * changes, largest, 1.0) * length
+        return CLOCK * np.where(changes < most * largest, largest, 1.0) * length
 
     def motion(self, p: Array) -> tuple[Motion, Limits, Near]:
         """Rates and guards together, guards alone, and guards `around` an instant, from a time in s and states."""

@@ -35,8 +35,6 @@ from shaftwork.pipeline.model import Model
 
 MANY = 12
 """From so many machines on that hold and slip matrices are quicker than equations for each combination that is met."""
-KEPT_RATES = 2
-"""Parameter vectors whose right-hand sides are kept in one combination of what holds."""
 
 
 class ReactionEquations(ModeEquations):
@@ -65,7 +63,8 @@ class ReactionEquations(ModeEquations):
     def holding(self, numbers: tuple[int, ...]) -> ReactionEquations:
         """The equations in which the machines of these numbers hold."""
         other = copy(self)
-        caches: dict[str, Any] = {name: BoundedCache(KEPT_RATES) for name in ("_guards_by_p", "_rates_by_p")}
+        # of each combination of what holds, few: there may be many of these
+        caches: dict[str, Any] = {name: BoundedCache(2) for name in ("_guards_by_p", "_rates_by_p")}
         laws = [law for k in numbers if (law := self._laws[k]) is not None]
         vars(other).update(_holding_laws=laws, _joints=None, _entries_of=None, **caches)
         return other

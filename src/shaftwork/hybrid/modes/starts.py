@@ -25,9 +25,6 @@ from shaftwork.formulation.observables import Observables
 from shaftwork.hybrid.modes.mode_machines import ModeMachine, ModeNames
 from shaftwork.network.graph import GraphPart
 
-SPEEDS = 256
-"""Speeds across machines that are kept with values of the parameters."""
-
 
 class MachineReadings:
     """What machines show at one instant: the speed across each, its twist, and what its start conditions read.
@@ -53,7 +50,7 @@ class MachineReadings:
         # of each machine the place where what it shows begins
         self._firsts = tuple(accumulate((2 + len(symbols) for symbols in self._symbols), initial=0))
         self._speeds: dict[int, Callable[..., Any]] = {}
-        self._bound = BoundedCache[tuple[int, bytes], Callable[..., Any]](SPEEDS)
+        self._bound = BoundedCache[tuple[int, bytes], Callable[..., Any]](256)
 
     def first_modes(self, t: float, read: Sequence[float], p: Array) -> ModeNames:
         """The mode of each machine in which a motion starts, in the equations in which nothing is joined by a mode."""
