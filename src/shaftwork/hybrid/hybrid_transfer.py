@@ -16,7 +16,9 @@ from shaftwork.pipeline.motion_start import Ending
 
 
 class HybridTransfer:
-    """The combinations of modes of a network for one set of values; each is made when it is first needed.
+    """Takes all that is stored from one combination of modes to another, for one set of values of the parameters.
+
+    It makes the regime of a combination, its equations with these values, when it is first needed, and keeps it.
 
     Args:
         equation_sets: the sets of equations.
