@@ -25,15 +25,16 @@ class Commutation:
     def __init__(self, transfer: HybridTransfer) -> None:
         self._transfer, self._machines = transfer, transfer.machines
 
-    def commutated(self, state: HybridState, t: float, modes: ModeNames) -> tuple[HybridState, dict[int, str]]:
-        """The modes that are wanted, and what then takes over a torque or current that they would cut off."""
-        plain = self._transfer.to_modes(state, t, modes)
+    def commutated(self, t: float, after: float, state: HybridState, changed: dict[int, str]) -> EventOutcome:
+        """Machines pass to other modes, and diodes and freewheels to those in which they take over what is cut off."""
+        modes = with_modes(state.regime.modes, changed)
+        plain = self._transfer.to_modes(state, after, modes)
         names = plain.regime.stores.through
-        if plain.x is not state.x and names and not self._keeps(t, state, plain, names):
-            for other, changed in self._keeping(t, state, modes, takeovers(self._machines, modes), names):
-                if not exceeded(other, t, other)[1]:
-                    return other, changed
-        return plain, {}
+        if plain.x is not state.x and names and not self._keeps(after, state, plain, names):
+            for other, led in self._keeping(after, state, modes, takeovers(self._machines, modes), names):
+                if not exceeded(other, after, other)[1]:
+                    return other, self._transitions(t, state, changed | led)
+        return plain, self._transitions(t, state, changed)
 
     def switched(self, t: float, after: float, state: HybridState, number: int, to: str) -> EventOutcome | None:
         """A switch changes, with all others whose time it is too, and diodes so that all that is stored goes on.
@@ -53,17 +54,16 @@ class Commutation:
         options = [*_led(self._machines, new_modes, ACROSS), *_led(self._machines, new_modes, -THROUGH)]
         for new, led in self._keeping(after, state, new_modes, _sets(options, 0), names):
             if not any(self._machines[active.machine].is_one_way for _, active in exceeded(new, after, new)[1]):
-                return new, self._changes(t, modes, changed | led)
+                return new, self._transitions(t, state, changed | led)
         opens = {k: to for k, to in changed.items() if not self._machines[k].is_rigid(to)}
         if not 0 < len(opens) < len(changed):
             return None
         with suppress(NetworkError):  # then each by itself, which says what contradicts what
-            new, led = self.commutated(state, after, with_modes(modes, opens))
-            return new, self._changes(t, modes, opens | led)
+            return self.commutated(t, after, state, opens)
         return None
 
-    def _changes(self, t: float, modes: ModeNames, changed: Mapping[int, str]) -> list[Transition]:
-        return [Transition(t, self._machines[k], modes[k], name) for k, name in changed.items()]
+    def _transitions(self, t: float, state: HybridState, changed: Mapping[int, str]) -> list[Transition]:
+        return [Transition(t, self._machines[k], state.regime.modes[k], name) for k, name in changed.items()]
 
     def _keeping(
         self, t: float, state: HybridState, modes: ModeNames, sets: Iterable[dict[int, str]], names: Sequence[str]

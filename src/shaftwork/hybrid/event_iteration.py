@@ -100,19 +100,14 @@ class EventIteration:
         # Who carries is told anew. A law that falls at once would tell a way in which nothing moves: of two frictions
         # one has given way at rest, and now the other one does, backward. Once it moves, the first one has less torque
         # than it holds at rest, and would move forward instead, which the other one does not let it.
-        stuck, begun = self._with_holding(t, after, state, holding)
+        modes = state.regime.modes
+        stuck = self.transfer.to_modes(state, after, with_modes(modes, self.transfer.compatible(modes, holding)))
         new, transitions = self._consistent(t, after, stuck, None)
-        if new.regime.modes == state.regime.modes:  # rounding hides what was met
+        if new.regime.modes == modes:  # rounding hides what was met
             crossed = [(active.machine, active.leave) for active in state.regime.watched if active.guard == met]
             same = (active.guard for active in stuck.regime.watched if (active.machine, active.leave) in crossed)
             new, transitions = self._fewest(t, after, stuck, next(same, None))
-        return new, _together([*begun, *transitions])
-
-    def _with_holding(self, t: float, after: float, state: HybridState, holding: Mapping[int, str]) -> EventOutcome:
-        """The same instant with machines in modes in which they hold, and the transitions to these."""
-        modes, compatible = state.regime.modes, self.transfer.compatible(state.regime.modes, holding)
-        transitions = [Transition(t, self.machines[k], modes[k], name) for k, name in compatible.items()]
-        return self.transfer.to_modes(state, after, with_modes(modes, compatible)), transitions
+        return new, _together([*differences(t, self.machines, modes, stuck.regime.modes), *transitions])
 
     def _fewest(self, t: float, after: float, state: HybridState, met: int | None) -> EventOutcome:
         """Of several guards that are met at one instant, rounding tells which of them ends the phase.
@@ -222,10 +217,7 @@ class EventIteration:
             if speed or (leave.rebound is not None and not slips):
                 hit = self.impacts.hit(t, after, state, replace(crossed, leave=replace(leave, to=to)))
                 return *hit[:2], None, hit[2]
-            modes = with_modes(regime.modes, {number: to})
-            new, conducting = self._commutation.commutated(state, after, modes)
-            others = [Transition(t, self.machines[k], regime.modes[k], name) for k, name in conducting.items()]
-            return new, [Transition(t, machine, before, to), *others], None, 0.0
+            return *self._commutation.commutated(t, after, state, {number: to}), None, 0.0
         except NetworkError as error:
             return *self._instead(t, after, state, (number, to), error, tried), error, 0.0
 

@@ -160,32 +160,24 @@ class HybridRun:
             return {}
         regime = self.event_iteration.transfer.regime(self.equation_sets.first)
         rest = np.zeros(len(regime.model.states))
-        modes = regime.equations.first_modes(self._after(regime), rest, regime.p)
+        modes = regime.equations.first_modes(self.timeline(regime).sides(self.demand.span[0])[1], rest, regime.p)
         rigid = {k: modes[k] for k in switches if modes[k] != self.equation_sets.first[k]}
         return rigid if self.event_iteration.transfer.possible(with_modes(self.equation_sets.first, rigid)) else {}
 
     def _read(self, initial: Mapping[str, float] | None, rigid: Mapping[int, str]) -> HybridState:
         """Start values in the equations in which some machines are rigid."""
-        start, regime = (
-            self.demand.span[0],
-            self.event_iteration.transfer.regime(with_modes(self.equation_sets.first, rigid)),
-        )
-        equations = regime.equations
+        regime = self.event_iteration.transfer.regime(with_modes(self.equation_sets.first, rigid))
+        start, equations = self.demand.span[0], regime.equations
         if isinstance(initial, Mapping) and initial and start != 0:
             refuse_incomplete(equations.stores.names, initial, start)
         x, waves = equations.model.start(equations.prepared(regime.p), initial, self.demand.span)
         return HybridState(regime, self._beside_waves(regime, x, waves))
 
-    def _after(self, regime: Regime) -> float:
-        """A time just after the start."""
-        return self.timeline(regime.equations, regime.p).sides(self.demand.span[0])[1]
-
     def _going_on(self, rigid: Mapping[int, str], read: HybridState) -> EventOutcome:
         """The modes that go on from a start that has been read where some machines are rigid, and the transitions."""
-        after = self._after(read.regime)
-        return self.event_iteration.run(
-            self.demand.span[0], after, self.event_iteration.in_start_modes(after, read.x, rigid), None
-        )
+        start = self.demand.span[0]
+        after = self.timeline(read.regime).sides(start)[1]
+        return self.event_iteration.run(start, after, self.event_iteration.in_start_modes(after, read.x, rigid), None)
 
     def _beside_waves(self, regime: Regime, x: Array, start: Any) -> Array:
         """The states at the start, and behind them what arrives by waves, if there are any."""
@@ -200,11 +192,9 @@ class HybridRun:
         """The states and modes in which another motion ended, and the transitions at that instant."""
         start, first = self.demand.span[0], self.event_iteration.transfer.regime(self.equation_sets.first)
         x = self._beside_waves(first, np.zeros(len(first.model.states)), ending.waves)
-        state, transitions = (
-            self.event_iteration.transfer.resumed(ending.beside(first.equations.arriving(x))),
-            list[Transition](),
-        )
-        after = self._instants(state).sides(start)[1]
+        state = self.event_iteration.transfer.resumed(ending.beside(first.equations.arriving(x)))
+        transitions = list[Transition]()
+        after = self.timeline(state.regime).sides(start)[1]
         if after != ending.read and state.regime.form.has_impulses:
             state, transitions, _ = self.event_iteration.impacts.jumped(start, state, ending.read, after)
         state, further = self.event_iteration.run(start, after, state, None)
@@ -225,15 +215,12 @@ class HybridRun:
         """Whether heyoka goes on from a time on: it is what was asked for, or suits the modes."""
         return self.demand.engine != "auto" or self._engine(state, lambda: self._problem(t, state))[0] == "heyoka"
 
-    def timeline(self, equations: ModeEquations, p: Array) -> Timeline:
+    def timeline(self, regime: Regime) -> Timeline:
         """The instants at which inputs jump or bend."""
-        timelines = self._shared.timelines
-        if equations.whole not in timelines:
-            timelines[equations.whole] = equations.model.switching.timeline(p, *self.demand.span)
-        return timelines[equations.whole]
-
-    def _instants(self, state: HybridState) -> Timeline:
-        return self.timeline(state.regime.equations, state.regime.p)
+        timelines, equations = self._shared.timelines, regime.equations.whole
+        if equations not in timelines:
+            timelines[equations] = regime.model.switching.timeline(regime.p, *self.demand.span)
+        return timelines[equations]
 
     def note(self, t: float, transitions: list[Transition]) -> None:
         """Put down the transitions at a time.
@@ -260,7 +247,7 @@ class HybridRun:
 
     def _problem(self, t: float, state: HybridState, in_place: InPlaceEvents | None = None) -> Problem:
         """The motion from a time on, up to the next instant at which an input jumps."""
-        demand, regime, times = self.demand, state.regime, self._instants(state)
+        demand, regime, times = self.demand, state.regime, self.timeline(state.regime)
         following = bisect_right(times.stops, t)
         end = min([*times.stops[following : following + 1], demand.span[1]])
         problem = state.problem((t, end), times)
@@ -299,7 +286,7 @@ class HybridRun:
     def _next_state(self, t: float, x: Array, in_place: InPlaceEvents, met: int | None) -> HybridState:
         """What goes on at the end of a run of the engine, from its states (n,) and the guard that is met, or None."""
         state = HybridState(in_place.regime, x, in_place.bands)
-        sides = self._instants(state).sides(t)
+        sides = self.timeline(state.regime).sides(t)
         if met is not None and in_place.beyond is not None and sides == (t, t):
             state, transitions = in_place.beyond
             self.note(t, transitions)
@@ -311,7 +298,7 @@ class HybridRun:
             met = None if transitions else met
         if met is None and t >= self.demand.span[1]:
             return state
-        after = self._instants(state).sides(t)[1]  # those of other equations, where a jump has led there
+        after = self.timeline(state.regime).sides(t)[1]  # those of other equations, where a jump has led there
         state, transitions = self.event_iteration.run(t, after, state, met)
         self.note(t, transitions)
         return state

@@ -93,7 +93,7 @@ class DenseMotion:
     def __getitem__(self, number: int) -> DensePhase:
         if number not in self._dense:
             segment, (_, regime) = self._pairs[number]
-            instants = self._run.timeline(regime.equations, regime.p)
+            instants = self._run.timeline(regime)
             self._dense[number] = DensePhase(regime, instants, segment)
         return self._dense[number]
 

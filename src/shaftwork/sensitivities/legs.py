@@ -181,10 +181,10 @@ def _through_phases(model: HybridModel, span: tuple[float, float], initial: Give
 
 
 def _start(run: HybridRun, initial: Given) -> Leg:
-    equation_sets, span = run.equation_sets, run.demand.span
-    equations, p = equation_sets.first_equations({})
+    regime, span = run.event_iteration.transfer.regime(run.equation_sets.first), run.demand.span
+    equations, p = regime.equations, regime.p
     x, _ = equations.model.start(equations.prepared(p), initial, span)
-    after = run.timeline(equations, p).sides(span[0])[1]
+    after = run.timeline(regime).sides(span[0])[1]
     return Leg(
         start=span[0],
         end=span[0],
@@ -195,7 +195,7 @@ def _start(run: HybridRun, initial: Given) -> Leg:
         dense=lambda times: np.tile(x, (len(times), 1)),
         steps=np.array([span[0]]),
         equations=equations,
-        modes=equation_sets.first,
+        modes=regime.modes,
     )
 
 
@@ -215,21 +215,20 @@ def _refuse_impulses(motion: DifferentiatedMotion) -> None:
 
 def _legs_of_run(run: HybridRun) -> Iterator[Leg]:
     """The legs of a motion through phases."""
-    for span, end in zip(
-        run.segments, [*(span.phases[0].start for span in run.segments[1:]), run.demand.span[1]], strict=True
-    ):
-        starts = [phase.start for phase in span.phases]
-        for phase, (start, stop) in zip(span.phases, pairwise([*starts, end]), strict=True):
+    ends = [*(segment.phases[0].start for segment in run.segments[1:]), run.demand.span[1]]
+    for segment, end in zip(run.segments, ends, strict=True):
+        starts = [phase.start for phase in segment.phases]
+        for phase, (start, stop) in zip(segment.phases, pairwise([*starts, end]), strict=True):
             if stop > start:
                 equations, p = phase.regime.equations, phase.regime.p
-                instants = run.timeline(equations, p)
-                leg = _leg(equations.model, p, _states(span), span.trajectory.steps, (start, stop), instants)
+                instants = run.timeline(phase.regime)
+                leg = _leg(equations.model, p, _states(segment), segment.trajectory.steps, (start, stop), instants)
                 yield replace(leg, equations=equations, modes=phase.regime.modes)
 
 
-def _states(span: Segment) -> Callable[[Array], Array]:
+def _states(segment: Segment) -> Callable[[Array], Array]:
     """Those of the equations, without their clocks."""
-    size, dense = len(span.phases[0].regime.model.states), span.trajectory.dense
+    size, dense = len(segment.phases[0].regime.model.states), segment.trajectory.dense
     return lambda times: dense(times)[:, :size]
 
 

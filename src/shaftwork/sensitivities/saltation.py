@@ -238,7 +238,7 @@ class JumpConditions:
         for watched in leg.equations.watched(leg.modes):
             ended = first.get(id(leg.equations.machines[watched.machine]))
             if ended is not None:
-                guard = leg.equations.guards_shown[watched.guard]
+                guard = leg.equations.expressions[watched.guard]
                 value, rate = self._course(old, guard)
                 if watched.side * rate > 0:
                     back = 0.0 if watched.leave.rebound is None else max(value / rate, 0.0)

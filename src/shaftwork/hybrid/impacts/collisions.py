@@ -204,7 +204,7 @@ class Collisions:
         least = NO_IMPACT * max(1.0, np.abs(before).max(initial=0.0))
         pressed = zip(contacts, _pressed(stages), strict=True)
         hit = [c for c, impulse in pressed if c.leave and ((meets and impulse > 0) or is_wanted(c))]
-        after, closed, further = self._after(t, modes, contacts, stages, least, hit)
+        after, closed, further = self._closed_at_end(t, modes, contacts, stages, least, hit)
         owners = (self._machines[contact.number].part.name for contact in contacts)
         taken = [{part: lost} for part, lost in zip(owners, self._taken(t, contacts, stages).tolist(), strict=True)]
         stages += further
@@ -241,11 +241,11 @@ class Collisions:
         start = self._apart(before, state, modes, contacts)
         stages = self._compressed(t, start, contacts)
         hit = [c for c, i in zip(contacts, _pressed(stages), strict=True) if i > 0]
-        after, _, further = self._after(t, modes, contacts, stages, least, hit)
+        after, _, further = self._closed_at_end(t, modes, contacts, stages, least, hit)
         passed = stages if _pressed(stages).any() or not further else ()  # sources jump with what passes
         return after, (*passed, *further)
 
-    def _after(
+    def _closed_at_end(
         self,
         t: float,
         before: ModeNames,

@@ -77,7 +77,8 @@ class ModeEquations:
         self.parts = {part.name: part for part in model.form.graph.parts}
         mode_guards = ModeGuards(model.form, machines, forms, readings)
         self.resting, self.watched, self.sides = mode_guards.resting, mode_guards.watched, mode_guards.sides
-        self._expressions, self._owners = mode_guards.expressions, mode_guards.owners
+        self.expressions, self._owners = mode_guards.expressions, mode_guards.owners
+        """The guards in states, parameters and time; the machine of each."""
         self._shown = MachineReadings(machines, self.parts, readings, self._parameters)
         if rows is None:
             _ = self._shown.function  # so that all quantities are known before any function of them is made
@@ -109,11 +110,6 @@ class ModeEquations:
         return x
 
     @property
-    def guards_shown(self) -> tuple[Expr, ...]:
-        """The guards in states, parameters and time."""
-        return tuple(self._expressions)
-
-    @property
     def clocks(self) -> tuple[int, ...]:
         """The guards in `timed` whose integrals stand behind the states."""
         return self.timed
@@ -122,7 +118,7 @@ class ModeEquations:
     def timed(self) -> tuple[int, ...]:
         """Guards that change with time by themselves, and not along straight pieces alone, or where no state moves."""
         every = not self.model.states
-        return tuple(k for k, guard in enumerate(self._expressions) if every or pieces_degree(guard) is None)
+        return tuple(k for k, guard in enumerate(self.expressions) if every or pieces_degree(guard) is None)
 
     def vector(self, base: Mapping[str, float], numbers: Mapping[str, float]) -> Array:
         """The parameter vector with the given values and numbers of modes."""
@@ -154,7 +150,7 @@ class ModeEquations:
         read, parameters = self._read(p), self.values(p).tolist()
 
         def guards(times: Array, states: Array) -> Array:
-            values = np.empty((len(self._expressions), len(times)))
+            values = np.empty((len(self.expressions), len(times)))
             with np.errstate(all="ignore"):
                 for row, value in enumerate(self._many(times, *read(times, states), *parameters)):
                     values[row] = value
@@ -164,7 +160,7 @@ class ModeEquations:
 
     @cached_property
     def _many(self) -> Callable[..., Any]:
-        return vectorised_list((TIME, *self._readings.symbols, *self._parameters), self._expressions)
+        return vectorised_list((TIME, *self._readings.symbols, *self._parameters), self.expressions)
 
     def _read(self, p: Array) -> Callable[[Array, Array], Array]:
         """What guards are made of at times (k,) and states (k, n): the states, or quantities that follow from them."""
@@ -277,7 +273,7 @@ class ModeEquations:
         """The first time at which a law or a guard has no value in some branch, and which one."""
         law, symbols = rough(self.bound(p), times, states), (TIME, *self._readings.symbols, *self._parameters)
         for active in () if law is not None else self.watched(modes):
-            function = vectorised(symbols, self._expressions[active.guard])
+            function = vectorised(symbols, self.expressions[active.guard])
             quantities = np.array([*self._read(p)(times, states)]).reshape(-1, times.size)
             for time, values in zip(times, quantities.T, strict=True):
                 if is_rough(function, (time, *values, *self.values(p))):
@@ -357,7 +353,7 @@ class ModeEquations:
         """What makes `motion` of the values of all parameters."""
         rows = self._rows
         assert rows is not None  # noqa: S101 (asked only then)
-        return bindable({"t": TIME, "x": rows.states}, {"p": rows.parameters}, rows.rates, self._expressions)
+        return bindable({"t": TIME, "x": rows.states}, {"p": rows.parameters}, rows.rates, self.expressions)
 
     def sizes(self, p: Array) -> list[float]:
         """The nominal size of each state."""
@@ -376,9 +372,9 @@ class ModeEquations:
         from shaftwork.codegen.taylor.heyoka import build
 
         states = (*rows.states, *(Symbol(f"clock {k}", real=True) for k in self.clocks))
-        rates = (*rows.rates, *(CLOCK * self._expressions[k] for k in self.clocks))
+        rates = (*rows.rates, *(CLOCK * self.expressions[k] for k in self.clocks))
         changing = [*(rows.parameters[place] for place in self._numbers), *rows.parameters[len(self._places) :]]
         try:
-            return build(states, TIME, rows.parameters, rates, tuple(self._expressions), changing)
+            return build(states, TIME, rows.parameters, rates, tuple(self.expressions), changing)
         except CompileError:
             return None

@@ -86,7 +86,7 @@ class ReactionEquations(ModeEquations):
         """
         if self._entries is None or not self.clocks:
             return self._entries is not None
-        noisy = any(isinstance(part, HeldNoise | SmoothNoise) for part in parts(self._expressions))
+        noisy = any(isinstance(part, HeldNoise | SmoothNoise) for part in parts(self.expressions))
         return engine in ("auto", "heyoka") and not noisy and self.program is not None
 
     @cached_property
