@@ -149,15 +149,17 @@ class EventIteration:
         after: float,
         state: HybridState,
         first: ActiveGuard | None,
-        most: tuple[int, int] = (2000, 2),
+        most_transitions: int = 2000,
+        most_returns: int = 2,
     ) -> EventOutcome:
         """Modes that are consistent with the motion that follows, by one transition after another; see `run`.
 
         Args:
             t, after, state: as there.
             first: the guard to begin with, or None.
-            most: so many transitions, or modes that have come back, have no end: of two rigid flanks without a gap
-                between them, say. After the first time that modes come back guards are taken in their order.
+            most_transitions: so many have no end: those of two rigid flanks without a gap between them, say.
+            most_returns: so often modes may come back. After the first time guards are taken in their order, which
+                nearly always ends.
         """
         transitions: list[Transition] = []
         idle: list[ActiveGuard] = []
@@ -181,7 +183,7 @@ class EventIteration:
             impact = bool(latest) and latest[0].impact
             again = bool(latest) and not impact and state.regime.modes in seen
             repeats += again
-            if len(transitions) > most[0] or repeats > most[1]:
+            if len(transitions) > most_transitions or repeats > most_returns:
                 raise _endless(t, transitions, blocked)
             if again or impact:
                 seen.clear()

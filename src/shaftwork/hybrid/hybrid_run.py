@@ -319,7 +319,7 @@ class HybridRun:
             return replace(still, end=(problem.t_end, problem.x0)), in_place
         name, why = self._engine(state, lambda: problem)
         if self.waves is not None:
-            return self._solve(problem, name, why, self.waves.solver(state.regime)), in_place
+            return self._solve(problem, name, why, partial(self.waves.solve, state.regime)), in_place
         stiff, most = name != "heyoka", problem.max_steps
         if self.demand.engine != "auto" or (stiff and not self.equation_sets.tries_heyoka(state.regime.equations)):
             return self._solve(problem, name, why), in_place
