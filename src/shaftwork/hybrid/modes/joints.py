@@ -57,7 +57,7 @@ class HeldRows:
         rates, through = [*rows.rates], dict(rows.through)
         for group in map(sorted, groups):
             for place in group:
-                rates[place] = _product(self.projection, "joins", place, group, rows.rates)
+                rates[place] = _product(self.projection, "projection", place, group, rows.rates)
             for law, places in laws:
                 if not places.isdisjoint(group):
                     through[law] += _product(self.reactions, "reaction", law, group, rows.rates)
