@@ -84,7 +84,7 @@ class Impulses:
         self,
         t: float,
         start: ImpactStart,
-        outcome: Callable[[ImpactStart, Sequence[ImpactStage]], ImpulseOutcome],
+        impulse: Callable[[ImpactStart, Sequence[ImpactStage]], ImpulseOutcome],
         most: int = 100,
     ) -> tuple[ImpactStage, ...]:
         """All parts of an impulse, of which the last leads to its end.
@@ -92,7 +92,8 @@ class Impulses:
         Args:
             t: time after it in s at which inputs are read.
             start: before it.
-            outcome: of the rest of it from a start on, all in the modes that gears have there, and after what stages.
+            impulse: to what the rest of it leads from a start on, all in the modes that gears have there, and after
+                what stages.
             most: so many times gears may come to rest in it.
 
         Raises:
@@ -100,7 +101,7 @@ class Impulses:
         """
         stages: list[ImpactStage] = []
         while len(stages) < most:
-            start, rest = self._consistent(t, start, lambda begun: outcome(begun, stages))
+            start, rest = self._consistent(t, start, lambda begun: impulse(begun, stages))
             share, number = min(self._coming_to_rest(t, start, rest.after), default=(1.0, -1))
             stages.append(ImpactStage(start, rest, share))
             if number < 0:
@@ -115,10 +116,8 @@ class Impulses:
     def _reached(self, t: float, stage: ImpactStage, modes: ModeNames, number: int) -> ImpactStart:
         """The end of a stage, at which a gear is at rest, in the modes that go on."""
         start, outcome, share = stage
-        stored = {
-            name: value + share * gain
-            for (name, value), gain in zip(start.stored.items(), self._gained(t, start, outcome).values(), strict=True)
-        }
+        gained = self._gained(t, start, outcome)
+        stored = {name: value + share * gained[name] for name, value in start.stored.items()}
         speeds = {k: v + share * (outcome.after.across(k, t) - v) for k, v in start.speeds.items()}
         return ImpactStart(self._transfer.with_stored(modes, t, stored), t, stored, {**speeds, number: 0.0})
 
@@ -129,13 +128,13 @@ class Impulses:
         return self.begins(new.state, t) if any(start.speeds[k] for k in halted) else new
 
     def _consistent(
-        self, t: float, start: ImpactStart, outcome: Callable[[ImpactStart], ImpulseOutcome]
+        self, t: float, start: ImpactStart, impulse: Callable[[ImpactStart], ImpulseOutcome]
     ) -> tuple[ImpactStart, ImpulseOutcome]:
         """The modes of gears in which an impulse passes as they say; a gear that turns, and has none, jams at once."""
-        rest, jammed, seen = self._passed(start, outcome), set[int](), {start.state.regime.modes}
+        rest, jammed, seen = self._passed(start, impulse), set[int](), {start.state.regime.modes}
         while True:
             if rest is None or rest.after is start.state:
-                start, rest = self._released(t, start, outcome) or (start, rest or outcome(start))
+                start, rest = self._released(t, start, impulse) or (start, rest or impulse(start))
             turn = self._turned(t, start, rest)
             if turn is None:
                 return start, rest
@@ -148,20 +147,20 @@ class Impulses:
                 seen.clear()
                 modes = self._at_rest(modes, number)
             start = self._in_modes(t, start, modes)
-            rest = self._passed(start, outcome)
+            rest = self._passed(start, impulse)
             seen.add(modes)
 
-    def _passed(self, start: ImpactStart, outcome: Callable[[ImpactStart], ImpulseOutcome]) -> ImpulseOutcome | None:
+    def _passed(self, start: ImpactStart, impulse: Callable[[ImpactStart], ImpulseOutcome]) -> ImpulseOutcome | None:
         """What an impulse leads to; None where the equations of a gear at rest contradict what it meets."""
         try:
-            return outcome(start)
+            return impulse(start)
         except NetworkError:
             if not self._stopped(start.state):
                 raise
             return None
 
     def _released(
-        self, t: float, start: ImpactStart, outcome: Callable[[ImpactStart], ImpulseOutcome]
+        self, t: float, start: ImpactStart, impulse: Callable[[ImpactStart], ImpulseOutcome]
     ) -> tuple[ImpactStart, ImpulseOutcome] | None:
         """Where gears at rest and what they meet hold each other, no impulse tells its way: which gear it turns.
 
@@ -172,7 +171,7 @@ class Impulses:
             options = (with_modes(start.state.regime.modes, {k: name}) for name in turning)
             for modes in filter(self._transfer.possible, options):
                 here = self._in_modes(t, start, modes)
-                rest = self._passed(here, outcome)
+                rest = self._passed(here, impulse)
                 if rest is None or rest.after is here.state:
                     continue
                 turned = self._turned(t, here, rest)

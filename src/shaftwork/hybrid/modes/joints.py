@@ -85,7 +85,7 @@ def groups(
     """The states that laws connect, or None where rows are not the place for what holds.
 
     They are where no machine rests because others hold both of its ends: as a rule, each holds inertias of its own. Who
-    carries would be another question, which an equations of its own answers.
+    carries would be another question, which equations of their own answer.
 
     Args:
         form: of the equations in which nothing holds.
@@ -154,14 +154,10 @@ class Joints:
     def entries(self, rows: HeldRows) -> Array:
         """(k,) the numbers of the symbols in rows: those of P and of R."""
         number = {branch: k for k, branch in enumerate(self._branches)}
-        entries = np.zeros(len(rows.symbols))
-        entries[: len(rows.projection)] = _at(self._projection, [*rows.projection])
-        reactions = [
-            (k, (number[branch], place)) for k, (branch, place) in enumerate(rows.reactions) if branch in number
-        ]
-        entries[[len(rows.projection) + k for k, _ in reactions]] = _at(
-            self._reactions.sparse, [place for _, place in reactions]
-        )
+        entries, first = np.zeros(len(rows.symbols)), len(rows.projection)
+        entries[:first] = _at(self._projection, [*rows.projection])
+        places = {k: (number[one], place) for k, (one, place) in enumerate(rows.reactions, first) if one in number}
+        entries[[*places]] = _at(self._reactions.sparse, [*places.values()])
         return entries
 
     def met(self, x: Array) -> Array:
