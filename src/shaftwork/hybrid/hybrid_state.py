@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import cached_property, partial
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -13,12 +13,10 @@ from sympy import Expr, Integer
 from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.code import Moves
-from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.codegen.timeline import Timeline
 from shaftwork.components.branches import INTEGRAL
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Leave, Mode
-from shaftwork.formulation.form import StateForm
 from shaftwork.hybrid.consistency import (
     clear_of_limit,
     drift,
@@ -29,7 +27,6 @@ from shaftwork.hybrid.consistency import (
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import ActiveGuard, ModeMachine, ModeNames
 from shaftwork.integrate.problem import Guards, Problem, changed
-from shaftwork.pipeline.model import Model
 
 Course = tuple[float, list[float], list[float], list[float]]
 """Time, states, their rates, and guards."""
@@ -75,37 +72,23 @@ class Regime:
 
     def __init__(self, modes: ModeNames, equations: ModeEquations, p: Array, tick: float, longest: float) -> None:
         self.modes, self.equations, self.p, self.tick, self.longest = modes, equations, p, tick, longest
+        self.model, self.form, self.stores = equations.model, equations.model.form, equations.stores
+        """The compiled equations, their state form, and what they store."""
+        self.machines = equations.machines
+        """Of the network."""
         self.motion, self.limits, self.near = equations.motion(p)
         """Rates and guards at an instant; the guards alone; the guards around an instant, by the `moves` of states."""
         self.sizes, self.sides, self.watched = equations.sizes(p), equations.sides(modes), equations.watched(modes)
         """Nominal size of each state; on which side each guard is met; everything that may end one of the modes."""
+        self.right_side = partial(equations.right_side, p)
+        """Makes the right-hand side."""
         self.in_place: dict[int, Any] = {}
         """By guard, the in-place transition to which it leads, or None; found when it is first met."""
-
-    @property
-    def model(self) -> Model:
-        """The compiled equations."""
-        return self.equations.model
-
-    @property
-    def form(self) -> StateForm:
-        """The state form of the equations."""
-        return self.equations.model.form
-
-    @property
-    def stores(self) -> StateTransfer:
-        """What the equations store."""
-        return self.equations.stores
 
     @property
     def bound(self) -> BoundArrays:
         """The array program with its parameters."""
         return self.equations.bound(self.p)
-
-    @property
-    def machines(self) -> tuple[ModeMachine, ...]:
-        """Of the network."""
-        return self.equations.machines
 
     def mode(self, number: int) -> Mode:
         """The mode of a machine."""
@@ -126,11 +109,6 @@ class Regime:
     def ends(self) -> tuple[tuple[int, float], ...]:
         """Number and side of each guard that ends one of the modes."""
         return tuple((active.guard, active.side) for active in self.watched)
-
-    @cached_property
-    def right_side(self) -> Callable[[], Callable[[float, Array], Array]]:
-        """Makes the right-hand side."""
-        return partial(self.equations.right_side, self.p)
 
     @cached_property
     def moves(self) -> Moves:
