@@ -96,21 +96,21 @@ class InPlaceEvents:
             return self._resets[number]
         if self.beyond is not None or self._note is None:
             return None
-        before = HybridState(self.regime, x[: self._size].copy(), self.bands)
-        outcome = self._by_this_guard(met, t, before) or self._by_iteration(met, t, before)
+        x = x[: self._size]
+        outcome = self._by_this_guard(met, t, x) or self._by_iteration(met, t, x)
         if outcome is None:
             return None
         state, transitions = outcome
         regime = state.regime
         if regime not in self._suited:
             if not self._suits(t, state):
-                self.beyond = outcome
+                self.beyond = state._replace(x=state.x.copy()), transitions  # the engine goes on writing into its own
                 return None
             self._suited.add(regime)
         self.regime, self.bands = regime, state.bands
         self._note(t, transitions)
         self.phases.append(Phase(t, regime))
-        others = None if state.x is before.x else state.x
+        others = None if state.x is x else state.x
         reset = Reset(regime.values, regime.ends, state.bands, regime.right_side, others)
         self._resets.append(reset)
         return reset
@@ -122,13 +122,13 @@ class InPlaceEvents:
         """
         self._note, self._suits = None, _always
 
-    def _by_iteration(self, met: int, t: float, before: HybridState) -> EventOutcome | None:
+    def _by_iteration(self, met: int, t: float, x: Array) -> EventOutcome | None:
         """What the event iteration makes of it, or None where the engine must stop."""
-        self.refuse_missed(met, t, before.x)
-        outcome = self._event_iteration.run(t, t, before, met)
+        self.refuse_missed(met, t, x)
+        outcome = self._event_iteration.run(t, t, HybridState(self.regime, x, self.bands), met)
         state = outcome[0]
-        alike = state.regime.equations.whole is before.regime.equations.whole and is_same(state.x, before.x)
-        if state.x is before.x or alike:
+        alike = state.regime.equations.whole is self.regime.equations.whole and is_same(state.x, x)
+        if state.x is x or alike:
             return outcome
         self.beyond = outcome  # other equations, or an impact in these
         return None
@@ -161,36 +161,34 @@ class InPlaceEvents:
                 cause = f"{words}, and the series of heyoka have not shown it"
                 raise SeriesError(f"The heyoka engine has not seen that {words}. Take engine='scipy'.", cause)
 
-    def _by_this_guard(self, met: int, t: float, before: HybridState) -> EventOutcome | None:
+    def _by_this_guard(self, met: int, t: float, x: Array) -> EventOutcome | None:
         """Where this guard leads by itself, or None where it takes more to tell.
 
         The same as in `EventIteration`, for the guards of one combination of modes only: it is asked at every event.
         What comes to hold by more than it can gives way at once.
         """
-        first = self._transition(before.regime, met)
+        first = self._transition(self.regime, met)
         if first is None:
             return None
-        state, transitions = self._state_after(first, met, t, before), [first.at(t)]
+        state, transitions = self._state_after(first, met, t, x), [first.at(t)]
         if isinstance(state, int):
             second = self._transition(first.to, state) if first.changes_form else None
             if second is None or second.machine is not first.machine or not second.changes_form:
                 return None
             if second.after == first.before:
                 return None
-            state, transitions = self._state_after(second, met, t, before), [first.at(t), second.at(t)]
+            state, transitions = self._state_after(second, met, t, x), [first.at(t), second.at(t)]
         return None if state is None or isinstance(state, int) else (state, transitions)
 
-    def _state_after(
-        self, transition: InPlaceTransition, met: int, t: float, before: HybridState
-    ) -> HybridState | int | None:
+    def _state_after(self, transition: InPlaceTransition, met: int, t: float, x: Array) -> HybridState | int | None:
         """The state in the modes that follow; or the number of a guard that is beyond its limit there; None where it
         takes more to tell.
         """
-        to, wide, side = transition.to, before.bands, transition.side
-        x = to.equations.taking_over(before.x, to.p) if transition.changes_form else before.x
-        if x is None:  # what comes to hold stops something
+        to, wide, side = transition.to, self.bands, transition.side
+        states = to.equations.taking_over(x, to.p) if transition.changes_form else x
+        if states is None:  # what comes to hold stops something
             return None
-        now, near, later = to.near(t, x.tolist(), to.tick, to.moves, to.longest)
+        now, near, later = to.near(t, states.tolist(), to.tick, to.moves, to.longest)
         bands = [0.0] * len(now)
         for guard, end, must_be_within in transition.watched:
             excess, band = end * now[guard], abs(near[guard] - now[guard])
@@ -201,7 +199,7 @@ class InPlaceEvents:
         # a machine that neither comes to hold nor gives way must leave its guard behind for good
         if not transition.changes_form and (side * now[met] < 0 or not side * (later[met] - now[met]) > 0):
             return None
-        return HybridState(to, x, bands)
+        return HybridState(to, states, bands)
 
     def _transition(self, regime: Regime, met: int) -> InPlaceTransition | None:
         """The transition to which a guard leads by itself in the same equations, or None where there is none."""
