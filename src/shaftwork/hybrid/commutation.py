@@ -43,7 +43,7 @@ class Commutation:
         those that open do so before others close then.
         """
         modes, changed = state.regime.modes, {number: to}
-        now, bands = state.regime.limits(after, state.x.tolist()), state.bands
+        now, bands = state.regime.guards_at(after, state.x.tolist()), state.bands
         for active in state.regime.watched:
             k = active.machine
             met = active.leave.by_time and active.side * now[active.guard] >= -(bands[active.guard] if bands else 0.0)

@@ -125,7 +125,7 @@ class EquationSets:
         if not slipping:
             return False
         x = np.random.default_rng(0).uniform(1.0, 2.0, len(equations.model.states))  # no two alike by chance
-        speeds = equations.across(slipping, 0.0, equations.joints(p).alike(x), p)
+        speeds = equations.across(slipping, 0.0, equations.joints(p).as_one(x), p)
         return any(abs(speed) < NO_IMPACT for speed in speeds)
 
     def _all_slipping(self, free: ModeNames) -> ReactionEquations | None:

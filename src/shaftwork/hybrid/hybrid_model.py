@@ -218,7 +218,9 @@ def warn_of_held_torques(state: HybridState, when: float, left: float = 1e-3) ->
     shares = np.random.default_rng(0).uniform(1.0, 2.0, x.size)  # no state makes up for another
     disturbed = shares / energy_weights(bound)
     remaining = lasting(bound, x, disturbed, when)
-    now, soon, late = (np.array(regime.limits(when, (x + change).tolist())) for change in (0 * x, disturbed, remaining))
+    now, soon, late = (
+        np.array(regime.guards_at(when, (x + change).tolist())) for change in (0 * x, disturbed, remaining)
+    )
     moves = np.abs(late - now) > left * np.abs(soon - now).max()
     if names := tuple(dict.fromkeys(name for name, guard in holding if moves[guard])):
         network = bound.program.form.graph.name

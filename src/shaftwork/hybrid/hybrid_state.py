@@ -76,7 +76,7 @@ class Regime:
         """The compiled equations, their state form, and what they store."""
         self.machines = equations.machines
         """Of the network."""
-        self.motion, self.limits, self.near = equations.motion(p)
+        self.motion, self.guards_at, self.near = equations.motion(p)
         """Rates and guards at an instant; the guards alone; the guards around an instant, by the `moves` of states."""
         self.sizes, self.sides, self.watched = equations.sizes(p), equations.sides(modes), equations.watched(modes)
         """Nominal size of each state; on which side each guard is met; everything that may end one of the modes."""
@@ -149,10 +149,12 @@ class Regime:
             beside: the guards at `beside(here)`, where they are known.
         """
         now = here[3]
-        bands = [abs(near - guard) for near, guard in zip(beside or self.limits(*self.beside(here)), now, strict=True)]
+        bands = [
+            abs(near - guard) for near, guard in zip(beside or self.guards_at(*self.beside(here)), now, strict=True)
+        ]
         if not self.model.arrays.inputs.switching:
             return bands
-        other = self.limits(*self.beside(here, -1.0))
+        other = self.guards_at(*self.beside(here, -1.0))
         return [min(band, abs(near - guard)) for band, near, guard in zip(bands, other, now, strict=True)]
 
     def ahead(self, rates: list[float]) -> float:
@@ -213,7 +215,7 @@ class HybridState(NamedTuple):
         whole, sizes = regime.problem, equations.clock_sizes(span, self.x, regime.p)
         guards = whole.guards
         assert guards is not None  # noqa: S101 (which the equations give)
-        now = np.abs(regime.limits(span[0], self.x.tolist()))
+        now = np.abs(regime.guards_at(span[0], self.x.tolist()))
         return changed(
             whole,
             x0=np.concatenate([self.x, np.zeros(sizes.size)]),
@@ -322,7 +324,7 @@ def _further(regime: Regime, step: float, here: Course, *, bends: bool) -> Cours
 
 def passes_limit(state: HybridState, t: float) -> bool:
     """Whether the states are beyond a guard of the modes by more than rounding moves it."""
-    now = state.regime.limits(t, state.x.tolist())
+    now = state.regime.guards_at(t, state.x.tolist())
     wide = state.bands or [0.0] * len(now)
     watched = state.regime.watched
     return any(side_of_limit(active.side * now[active.guard], wide[active.guard]) > 0 for active in watched)
@@ -339,7 +341,7 @@ def resting(state: HybridState, t: float) -> dict[int, str]:
     if not slipping:
         return {}
     here = state.course(t)
-    now, near, still = here[3], regime.limits(*regime.beside(here)), regime.equations.resting
+    now, near, still = here[3], regime.guards_at(*regime.beside(here)), regime.equations.resting
     return {
         k: active.leave.to
         for k, active in slipping.items()

@@ -82,7 +82,7 @@ class HybridTransfer:
             NetworkError: the equations of these modes contradict each other.
         """
         new = self.regime(modes)
-        return HybridState(new, new.equations.taking(t, stored, new.p))
+        return HybridState(new, new.equations.states_from(t, stored, new.p))
 
     def to_modes(self, state: HybridState, t: float, modes: ModeNames) -> HybridState:
         """The same instant in other modes: all that is stored goes over.
@@ -145,7 +145,7 @@ def refuse_beyond(state: HybridState, t: float, tolerated: float = 1e-6) -> None
         ParameterError: names the part, its twist and the limit.
     """
     regime = state.regime
-    now = regime.limits(t, state.x.tolist())
+    now = regime.guards_at(t, state.x.tolist())
     for active in regime.watched:
         machine, beyond = regime.machines[active.machine], active.side * now[active.guard]
         if active.leave.rebound is None or not beyond > tolerated:

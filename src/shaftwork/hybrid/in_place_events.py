@@ -148,7 +148,7 @@ class InPlaceEvents:
         """
         regime, bands = self.regime, self.bands
         here = regime.course(t, x[: self._size].tolist())
-        now, before = here[3], regime.limits(*regime.later(here, -late * regime.tick))
+        now, before = here[3], regime.guards_at(*regime.later(here, -late * regime.tick))
         if any(map(math.isnan, now)):
             error = regime.equations.without_value(regime.p, regime.modes, np.array([t]), np.array([here[1]]))
             if error is not None:
@@ -185,7 +185,7 @@ class InPlaceEvents:
         takes more to tell.
         """
         to, wide, side = transition.to, self.bands, transition.side
-        states = to.equations.taking_over(x, to.p) if transition.changes_form else x
+        states = to.equations.states_held(x, to.p) if transition.changes_form else x
         if states is None:  # what comes to hold stops something
             return None
         now, near, later = to.near(t, states.tolist(), to.tick, to.moves, to.longest)

@@ -47,10 +47,10 @@ class WaveModeEquations(ModeEquations):
         names = (*self.ends, *(RATE + name for name in self.ends))
         return dict(zip(names, x[len(self.model.states) :].tolist(), strict=True))
 
-    def taking(self, t: float, stored: Mapping[str, float], p: Array) -> Array:
+    def states_from(self, t: float, stored: Mapping[str, float], p: Array) -> Array:
         """The states with which the equations take up what was stored, and what arrives; zero of what is not told."""
         names = (*self.ends, *(RATE + name for name in self.ends))
-        return np.concatenate([super().taking(t, stored, p), [stored.get(name, 0.0) for name in names]])
+        return np.concatenate([super().states_from(t, stored, p), [stored.get(name, 0.0) for name in names]])
 
     def sizes(self, p: Array) -> list[float]:
         """The nominal size of each state; of what arrives that of a wave with a nominal speed."""

@@ -209,5 +209,5 @@ def _late(t: float, state: HybridState, met: ActiveGuard) -> float:
     """How long ago, in s, a guard passed through zero along a straight line."""
     regime, here = state.regime, state.course(t)
     step, beyond = regime.ahead(here[2]), met.side * here[3][met.guard]
-    gain = met.side * regime.limits(*regime.later(here, step))[met.guard] - beyond
+    gain = met.side * regime.guards_at(*regime.later(here, step))[met.guard] - beyond
     return beyond * step / gain if 0 < beyond < gain else 0.0

@@ -101,12 +101,12 @@ class Impulses:
         """
         stages: list[ImpactStage] = []
         while len(stages) < most:
-            start, rest = self._consistent(t, start, lambda begun: impulse(begun, stages))
-            share, number = min(self._coming_to_rest(t, start, rest.after), default=(1.0, -1))
-            stages.append(ImpactStage(start, rest, share))
+            start, outcome = self._consistent(t, start, lambda begun: impulse(begun, stages))
+            share, number = min(self._coming_to_rest(t, start, outcome.after), default=(1.0, -1))
+            stages.append(ImpactStage(start, outcome, share))
             if number < 0:
                 return tuple(stages)
-            modes = self._at_rest(rest.after.regime.modes, number)
+            modes = self._at_rest(outcome.after.regime.modes, number)
             start = self._reached(t, stages[-1], modes, number)
         raise SimulationError(
             f"'{self._machines[number].name}' comes to rest again and again in one impact at t = {t:.9g} s. Give the "
@@ -131,23 +131,23 @@ class Impulses:
         self, t: float, start: ImpactStart, impulse: Callable[[ImpactStart], ImpulseOutcome]
     ) -> tuple[ImpactStart, ImpulseOutcome]:
         """The modes of gears in which an impulse passes as they say; a gear that turns, and has none, jams at once."""
-        rest, jammed, seen = self._passed(start, impulse), set[int](), {start.state.regime.modes}
+        outcome, jammed, seen = self._passed(start, impulse), set[int](), {start.state.regime.modes}
         while True:
-            if rest is None or rest.after is start.state:
-                start, rest = self._released(t, start, impulse) or (start, rest or impulse(start))
-            turn = self._turned(t, start, rest)
+            if outcome is None or outcome.after is start.state:
+                start, outcome = self._released(t, start, impulse) or (start, outcome or impulse(start))
+            turn = self._turned(t, start, outcome)
             if turn is None:
-                return start, rest
+                return start, outcome
             number, to = turn
             modes = self._led(start.state.regime.modes, number, to)
             if modes in seen:
                 if number in jammed:
-                    return start, rest
+                    return start, outcome
                 jammed.add(number)
                 seen.clear()
                 modes = self._at_rest(modes, number)
             start = self._in_modes(t, start, modes)
-            rest = self._passed(start, impulse)
+            outcome = self._passed(start, impulse)
             seen.add(modes)
 
     def _passed(self, start: ImpactStart, impulse: Callable[[ImpactStart], ImpulseOutcome]) -> ImpulseOutcome | None:
@@ -171,24 +171,24 @@ class Impulses:
             options = (with_modes(start.state.regime.modes, {k: name}) for name in turning)
             for modes in filter(self._transfer.possible, options):
                 here = self._in_modes(t, start, modes)
-                rest = self._passed(here, impulse)
-                if rest is None or rest.after is here.state:
+                outcome = self._passed(here, impulse)
+                if outcome is None or outcome.after is here.state:
                     continue
-                turned = self._turned(t, here, rest)
+                turned = self._turned(t, here, outcome)
                 if turned is None or turned[0] != k:
-                    return here, rest
+                    return here, outcome
         return None
 
     def _stopped(self, state: HybridState) -> list[int]:
         """Gears in a mode of rest."""
         return [k for k in self.gears if not _turns(state.regime.mode(k))]
 
-    def _turned(self, t: float, start: ImpactStart, rest: ImpulseOutcome) -> tuple[int, str] | None:
+    def _turned(self, t: float, start: ImpactStart, outcome: ImpulseOutcome) -> tuple[int, str] | None:
         """The gear that an impulse brings out of its mode at once, and the mode that follows."""
         if not self.gears:
             return None
-        equations, p = rest.passing.equations, rest.passing.p
-        impulses = self._impulses(t, start, rest)
+        equations, p = outcome.passing.equations, outcome.passing.p
+        impulses = self._impulses(t, start, outcome)
         # a gear elsewhere has the rounding of what moves there, however small the impact is
         momentum = equations.stores.momentum(equations.bound(p), start.stored)
         least = NOTHING_OF * max(np.abs(impulses).max(initial=0.0), momentum)
@@ -199,7 +199,7 @@ class Impulses:
             if leave.by_torque
         ]
         exceeded = [turn for turn in exceeded if turn[0] > least]
-        turning = (turn for turn in self._stopping(t, start, rest.after) if turn[0] >= 0)
+        turning = (turn for turn in self._stopping(t, start, outcome.after) if turn[0] >= 0)
         exceeded = exceeded or [(ends, k, to) for _, ends, k, to in turning]
         return max(exceeded)[1:] if exceeded else None
 

@@ -131,25 +131,25 @@ class Joints:
         """Whether each of them holds inertias that the others do not."""
         if followers is None or not self.independent:
             return
-        reactions, alike = _reactions(G, B), _alike(followers, size)
-        self._B, self._reactions, self._alike = Factor(B), Factor(reactions), Factor(alike)
-        self._projection = sparse.csr_array(alike @ (sparse.eye_array(size, format="csr") + B @ reactions))
+        reactions, as_one = _reactions(G, B), _as_one(followers, size)
+        self._B, self._reactions, self._as_one = Factor(B), Factor(reactions), Factor(as_one)
+        self._projection = sparse.csr_array(as_one @ (sparse.eye_array(size, format="csr") + B @ reactions))
         self._part = part
 
     @cached_property
     def moving(self) -> LinearPart:
         """The equations with what holds moving as one, to which its own laws add nothing; explicit rows need none."""
-        part, P, alike = self._part, self._projection, self._alike.sparse
+        part, P, as_one = self._part, self._projection, self._as_one.sparse
         others = sparse.diags_array(np.where(np.isin(np.arange(part.B.shape[1]), self.places), 0.0, 1.0))
-        return replace(part, A=P @ part.A, B=P @ part.B @ others, B1=P @ part.B1, C=part.C @ alike)
+        return replace(part, A=P @ part.A, B=P @ part.B @ others, B1=P @ part.B1, C=part.C @ as_one)
 
     def reactions(self, rates: Array) -> Array:
         """(h,) or (h, k): what cancels rates (n,) or (n, k) in the speeds across."""
         return self._reactions @ rates
 
-    def alike(self, x: Array) -> Array:
+    def as_one(self, x: Array) -> Array:
         """States or rates in which what is held follows the others to the last bit."""
-        return self._alike @ x
+        return self._as_one @ x
 
     def entries(self, rows: HeldRows) -> Array:
         """(k,) the numbers of the symbols in rows: those of P and of R."""
@@ -162,7 +162,7 @@ class Joints:
 
     def met(self, x: Array) -> Array:
         """(n,) the states after an inelastic impact of what is held: every momentum is kept."""
-        return self.alike(x + self._B @ self.reactions(x))
+        return self.as_one(x + self._B @ self.reactions(x))
 
 
 def _at(matrix: Any, places: Sequence[tuple[int, int]]) -> Array:
@@ -180,7 +180,7 @@ def _reactions(G: Any, B: Any) -> Any:
     return sparse.csr_array((solved.data, (solved.row, met[solved.col])), shape=G.shape)
 
 
-def _alike(followers: Mapping[int, Mapping[int, float]], size: int) -> Any:
+def _as_one(followers: Mapping[int, Mapping[int, float]], size: int) -> Any:
     """(n, n) sparse: each follower from the states that it follows, the others as they are."""
     entries = [(1.0, place, place) for place in range(size) if place not in followers]
     entries += [(gain, place, column) for place, row in followers.items() for column, gain in row.items()]
@@ -245,7 +245,7 @@ class HeldArrays(BoundArrays):
 
     def rates(self, t: Any, x: Array, y: Array, u: Array) -> Array:
         """x', in which what is held moves as one."""
-        return self.joints.alike(super().rates(t, x, y, u))
+        return self.joints.as_one(super().rates(t, x, y, u))
 
     def rhs(self, t: Any, x: Array) -> Array:
         """x' at time t."""

@@ -44,7 +44,7 @@ CLOCK = 1e-20
 RightSide = Callable[[float, Array], Array]
 GuardValues = Callable[[Array, Array], Array]
 Motion = Callable[[float, list[float]], tuple[list[float], list[float]]]
-Limits = Callable[[float, list[float]], list[float]]
+GuardsAt = Callable[[float, list[float]], list[float]]
 Near = Callable[[float, list[float], float, Moves, float], tuple[list[float], list[float], list[float]]]
 
 
@@ -97,7 +97,7 @@ class ModeEquations:
         """The rates of what arrives by waves and of its rates."""
         return []
 
-    def taking(self, t: float, stored: Mapping[str, float], p: Array) -> Array:
+    def states_from(self, t: float, stored: Mapping[str, float], p: Array) -> Array:
         """The states with which the equations take up what was stored, with the inputs of a time in s."""
         return self.stores.states(self.bound(p), t, stored)
 
@@ -105,7 +105,7 @@ class ModeEquations:
         """Whether a machine holds and gives way in these equations, by other numbers in explicit rows."""
         return False
 
-    def taking_over(self, x: Array, p: Array) -> Array | None:  # noqa: ARG002
+    def states_held(self, x: Array, p: Array) -> Array | None:  # noqa: ARG002
         """The states of other numbers in the same rows, or None where an impact leads there."""
         return x
 
@@ -334,22 +334,22 @@ class ModeEquations:
         # what is another number at once is rounding, and an engine that followed it would not get on
         return CLOCK * np.where(changes < most * largest, largest, 1.0) * length
 
-    def motion(self, p: Array) -> tuple[Motion, Limits, Near]:
+    def motion(self, p: Array) -> tuple[Motion, GuardsAt, Near]:
         """Rates and guards together, guards alone, and guards `around` an instant, from a time in s and states."""
         if self._rows is not None:
             return self.whole.motions(self.values(p).tolist())
         bound, guards = self.bound(p), self.guards(p)
 
-        def limits(t: float, x: list[float]) -> list[float]:
+        def guards_at(t: float, x: list[float]) -> list[float]:
             return guards(np.array([t]), np.array([x]))[0].tolist()  # type: ignore[no-any-return]
 
         def motion(t: float, x: list[float]) -> tuple[list[float], list[float]]:
-            return [*bound.rhs(t, np.array(x)).tolist(), *self.arriving_rates(x)], limits(t, x)
+            return [*bound.rhs(t, np.array(x)).tolist(), *self.arriving_rates(x)], guards_at(t, x)
 
-        return motion, limits, partial(around, motion, limits)
+        return motion, guards_at, partial(around, motion, guards_at)
 
     @cached_property
-    def motions(self) -> Callable[[list[float]], tuple[Motion, Limits, Near]]:
+    def motions(self) -> Callable[[list[float]], tuple[Motion, GuardsAt, Near]]:
         """What makes `motion` of the values of all parameters."""
         rows = self._rows
         assert rows is not None  # noqa: S101 (asked only then)

@@ -73,7 +73,7 @@ class ReactionEquations(ModeEquations):
         """Whether a machine holds and gives way by other numbers in explicit rows."""
         return self._entries is not None and self._laws[number] is not None
 
-    def taking_over(self, x: Array, p: Array) -> Array | None:
+    def states_held(self, x: Array, p: Array) -> Array | None:
         """The states in which all comes to one speed that holds, or None where an impact leads there."""
         met = self.joints(p).met(x)
         return met if is_same(met, x) else None
@@ -121,7 +121,7 @@ class ReactionEquations(ModeEquations):
     def _reading(self, bound: HeldArrays, matrices: ReadingMatrices) -> Callable[[Array, Array], Array]:
         """What guards are made of; rounding gives no speed to what holds."""
         exact = super()._reading(bound, matrices)
-        return lambda times, states: exact(times, bound.joints.alike(states.T).T)
+        return lambda times, states: exact(times, bound.joints.as_one(states.T).T)
 
     def bound(self, p: Array) -> HeldArrays:
         """The equations with their parameters."""
