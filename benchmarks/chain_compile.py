@@ -1,6 +1,6 @@
 """How much CPU and memory does a chain wired part by part cost, from the parts to the compiled model and its Jacobian?
 
-Run `python benchmarks/chain_compile.py`. The chain has n inertias and n - 1 damped springs under a torque step at its
+Run `python -m benchmarks.chain_compile`. The chain has n inertias and n - 1 damped springs under a torque step at its
 first inertia. CPU: process time, median; memory: the largest of a process of its own. The motion is compared with the
 modal solution in closed form.
 """
@@ -68,7 +68,7 @@ def exact_speeds(n: int, t: np.ndarray) -> np.ndarray:
 
 def peak_memory(n: int) -> float:
     """Largest memory in MiB of a process that makes the model of n inertias."""
-    code = f"import sys; sys.path.insert(0, {sys.path[0]!r}); from chain_compile import ready; ready({n})"
+    code = f"import sys; sys.path.insert(0, {sys.path[0]!r}); from benchmarks.chain_compile import ready; ready({n})"
     subprocess.run([sys.executable, "-c", code], check=True)
     return resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
 

@@ -1,10 +1,10 @@
 """What does an event cost in a chain of k gaps that spring, and in one of k dry frictions?
 
-Run `python benchmarks/contact_chains.py`, or with the largest k: `python benchmarks/contact_chains.py 8`. A torque that
+Run `python -m benchmarks.contact_chains`, or with the largest k: `python -m benchmarks.contact_chains 8`. A torque that
 swings pushes the first inertia, and the contacts behind it open and close, or slip and stick. CPU: process time of the
 first public call, which compiles, and of a second one; per event of the second one. Set OPENBLAS_NUM_THREADS=1, as
 threads that wait for each other count as CPU. The exponent is that of k between
-neighbouring sizes. To see what heyoka saves, give the engine: `python benchmarks/contact_chains.py 64 scipy`.
+neighbouring sizes. To see what heyoka saves, give the engine: `python -m benchmarks.contact_chains 64 scipy`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """How much CPU does the start of the crane cost at equal true error: Shaftwork, hand-written scipy, hand-written C?
 
-Run `python benchmarks/crane_rivals.py`; it needs gcc. The system is that of Marinkovic 2012, section 3 (two inertias, a
+Run `python -m benchmarks.crane_rivals`; it needs gcc. The system is that of Marinkovic 2012, section 3 (two inertias, a
 damped spring, a Kloss motor, a smooth travel resistance), 6.5 s with 651 output times. Error: largest deviation of the
 shaft torque from DOP853 at 1e-13 on the hand-typed equations, over the largest torque. CPU: process time of one warm
 call, median.

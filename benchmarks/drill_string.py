@@ -1,6 +1,6 @@
 """What does stick-slip of a drill string cost with each model of its pipe, and how exact is it?
 
-Run `python benchmarks/drill_string.py`, or with a shorter end time in s behind it. 3000 m of drill pipe hang between a
+Run `python -m benchmarks.drill_string`, or with a shorter end time in s behind it. 3000 m of drill pipe hang between a
 top drive with a speed controller and a bit whose friction falls with its speed, so that it sticks and slips. Period:
 mean time between two stops of the bit, the first left out. Error: of the speed of the bit at all output times, over its
 largest, against waves at rtol 1e-12, which the method of steps confirms to 1e-10 (tests/reference/drill_string.py).

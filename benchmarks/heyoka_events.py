@@ -12,7 +12,8 @@ from typing import Any
 
 import heyoka as hy
 import numpy as np
-import scipy_events as rival
+
+from benchmarks import scipy_events as rival
 
 DRIVES, SIDE, BRAKE, LOAD, FIRST = range(5)
 """Parameters: whether the motor drives, which flank carries, the signs of the two frictions; from FIRST on the sign

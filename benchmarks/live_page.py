@@ -1,6 +1,6 @@
 """How many updates a second does a live page have, and what does one cost?
 
-Run `python benchmarks/live_page.py`. CPU: process time of one answer, median, split into the run, the reading of all
+Run `python -m benchmarks.live_page`. CPU: process time of one answer, median, split into the run, the reading of all
 curves, and JSON. Updates: a slider of the page in chromium is moved without a break for some seconds; the page asks
 anew as soon as an answer is there. Server, browser and whatever else the machine does share its cores.
 """

@@ -1,6 +1,6 @@
 """How much CPU does the crane with gap and brake cost at equal true error: every engine, and scipy by hand?
 
-Run `python benchmarks/phases.py`. 62 events in 10 s; the rival is benchmarks/scipy_events.py, the truth has 40 digits.
+Run `python -m benchmarks.phases`. 62 events in 10 s; the rival is benchmarks/scipy_events.py, the truth has 40 digits.
 Error: largest of the end state (speeds in rad/s, twist in 0.01 rad). CPU: process time of one warm public call with two
 output times, median. A run that finds another number of events counts as wrong, whatever it says.
 """
@@ -13,11 +13,11 @@ import time
 from collections.abc import Callable, Sequence
 
 import numpy as np
-import scipy_events as rival
-from heyoka_events import BareCrane
-from scipy_events import RTOLS, SCALE, Point
 
 import shaftwork as sw
+from benchmarks import scipy_events as rival
+from benchmarks.heyoka_events import BareCrane
+from benchmarks.scipy_events import RTOLS, SCALE, Point
 
 Run = Callable[[float], tuple[int, np.ndarray]]
 """From a relative tolerance to the number of events and the end state."""

@@ -1,6 +1,6 @@
 """One evaluation of the right-hand side: model.rhs before and after model.compiled(), numpy by hand, and the same in C.
 
-    python benchmarks/right_hand_side.py
+    python -m benchmarks.right_hand_side
 
 A drive of motor, damped shaft of m elements and load; and the crane, whose three states show what a call costs. The C
 code is what gcc -O3 makes of `model.source("c")`, called a million times within C. Processor time, medians of seven.

@@ -1,6 +1,6 @@
 """The rival of benchmarks/phases.py: the crane with gap and brake by hand, scipy's DOP853 with terminal events.
 
-Run `python benchmarks/scipy_events.py`: events found, true error and CPU over tolerances. Each phase has its own
+Run `python -m benchmarks.scipy_events`: events found, true error and CPU over tolerances. Each phase has its own
 right-hand side in plain Python floats and its own events, terminal and with a direction; the integration starts anew in
 the next phase. scipy looks at signs at the ends of its steps alone: two events within a step are lost without a word,
 unless the steps are bounded. Equations and truth: tests/reference/hybrid_crane.py, with dry friction at J2.

@@ -1,6 +1,6 @@
 """What does a variant of the crane start cost in a sweep, how right is it, and does a stopped sweep go on?
 
-Run `python benchmarks/sweep.py [VARIANTS]`; 10000 by default. Random stiffness, damping and pull-out torque; measured
+Run `python -m benchmarks.sweep [VARIANTS]`; 10000 by default. Random stiffness, damping and pull-out torque; measured
 are the largest torque of the shaft and the speed at the end of 6.5 s. CPU: process time of the public call, set-up
 included, of the first call of this process and of a later one; less that of a call with a tenth of the variants it is
 without. The first one compiles, or finds what earlier processes have left in heyoka's cache, which with XDG_CACHE_HOME

@@ -1,6 +1,6 @@
 """Through how many files and functions does a reader have to go who follows one run?
 
-Run `python benchmarks/traced_files.py`. Counts the files and functions of the package that run while the crane's start
+Run `python -m benchmarks.traced_files`. Counts the files and functions of the package that run while the crane's start
 is compiled and simulated, whose load sticks at rest; while a drive whose laws are smooth is; and while one with a dry
 friction is. Imports do not count: what a module does while it is loaded is not part of the run.
 """

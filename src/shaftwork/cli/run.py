@@ -20,7 +20,7 @@ from shaftwork.cli.command import (
 from shaftwork.cli.folder import Folder, write_picture
 from shaftwork.core.domains import DOMAINS
 from shaftwork.core.files import write_rows
-from shaftwork.core.screen import counted, progress
+from shaftwork.core.screen import ROWS, counted, progress
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,8 +33,6 @@ if TYPE_CHECKING:
 FILES = ("signals.csv", "signals.png", "phases.csv", "events.csv")
 INTEGRALS = tuple(domain.integral.name for domain in DOMAINS)
 """Quantities that are recorded only when asked for."""
-LISTED = 12
-"""Phases shown of the beginning, and as many of the end, of a motion that has more."""
 
 
 def run_options(parser: ArgumentParser) -> None:
@@ -132,10 +130,10 @@ def _say_phases(solution: Solution, say: Say) -> None:
         return
     say(f"\n{'from s':>9} {'to s':>9}  {counted(len(rows), 'phase')}, {counted(len(solution.events), 'event')}")
     for number, row in enumerate(rows):
-        if not LISTED <= number < len(rows) - LISTED:
+        if not ROWS <= number < len(rows) - ROWS:
             say(f"{row.start:9.4f} {row.end:9.4f}  {row.name}")
-        elif number == LISTED:
-            say(f"{'...':>9} {'...':>9}  {len(rows) - 2 * LISTED} more")
+        elif number == ROWS:
+            say(f"{'...':>9} {'...':>9}  {len(rows) - 2 * ROWS} more")
 
 
 def _write(solution: Solution, signals: Sequence[str], place: Path) -> None:

@@ -22,7 +22,7 @@ _OPERATIONS: Mapping[str, Callable[[Any, Any], Any]] = {
     "+": operator.add,
     "/": operator.truediv,
 }
-LONGEST = 1000
+LARGEST_DENOMINATOR = 1000
 """The largest denominator of a fraction that is printed as one."""
 
 
@@ -188,5 +188,5 @@ def exactly(expression: Expr) -> Expr:
 
 def in_decimals(expression: Expr) -> Expr:
     """The expression with decimal numbers for fractions that are too long to be read."""
-    long = (number for number in expression.atoms(Rational) if number.q > LONGEST)
+    long = (number for number in expression.atoms(Rational) if number.q > LARGEST_DENOMINATOR)
     return expression.xreplace({number: Float(number) for number in long})

@@ -20,12 +20,10 @@ from shaftwork.components.shafts import Shaft
 from shaftwork.equations.assembly import Assembly, FactoredTerms, Sides, Terms, rising_first
 from shaftwork.equations.quantities import Quantities
 from shaftwork.formulation.form import StateForm
+from shaftwork.formulation.gains import LARGEST_DENOMINATOR
 from shaftwork.network.graph import GraphPart
 from shaftwork.network.kinds import Kind
-
-ROUNDING = 1e-9
-"""Weights are right to some 13 digits, and products of gear ratios lose a few of them."""
-LARGEST_DENOMINATOR = 1000
+from shaftwork.numerics.tolerances import TYPED
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +145,7 @@ class SpectralShaft:
         summed: list[Expr] = []
         for rest, row in factors.items():
             multiples = np.linalg.lstsq(self.weights, row)[0]
-            if np.abs(self.weights @ multiples - row).max() > ROUNDING * np.abs(row).max():
+            if np.abs(self.weights @ multiples - row).max() > TYPED * np.abs(row).max():
                 return terms
             summed += (_exact(m) * rest * self.sum_at(end) for m, (end, _) in zip(multiples, self.ends, strict=True))
         kept = {place: (term,) for place, term in enumerate(terms) if place not in places}
@@ -183,4 +181,4 @@ def in_sums(row: Sides, shafts: Sequence[SpectralShaft]) -> Sides:
 def _exact(value: float) -> Expr:
     """A whole number or a short fraction where a number is one to rounding, as 0, 1 and -1 are."""
     short = Rational(value).limit_denominator(LARGEST_DENOMINATOR)
-    return short if abs(float(short) - value) <= ROUNDING * max(1.0, abs(value)) else Float(value)
+    return short if abs(float(short) - value) <= TYPED * max(1.0, abs(value)) else Float(value)

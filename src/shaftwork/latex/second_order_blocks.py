@@ -15,9 +15,6 @@ from shaftwork.latex.blocks import Block, Blocks
 from shaftwork.latex.nomenclature import Cells
 from shaftwork.latex.printing import LINE_WIDTH, Line, Writer, printed_width
 
-LARGEST_MATRIX = 6
-"""Coordinates up to which the second-order form is printed as matrices."""
-
 
 @dataclass(frozen=True, eq=False)
 class SecondOrderBlocks:
@@ -68,7 +65,7 @@ class SecondOrderBlocks:
     @cached_property
     def _matrices(self) -> tuple[Line, ...]:
         """The equations as matrices; nothing where these do not fit on a page, or would have weights in them."""
-        if len(self.form.coordinates) > LARGEST_MATRIX or self.blocks.shafts:
+        if len(self.form.coordinates) > 6 or self.blocks.shafts:  # wider matrices leave the page
             return ()
         lines = tuple(self._matrix_lines())
         return lines if max(map(_matrix_width, lines)) <= LINE_WIDTH else ()

@@ -35,6 +35,7 @@ from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import has_mode
 from shaftwork.core.errors import ParameterError, ShaftworkError
+from shaftwork.numerics.tolerances import TYPED
 
 
 class Kind(IntEnum):
@@ -53,9 +54,6 @@ Resolved = tuple[Kind, Expr]
 """A kind and the law of a branch of that kind."""
 CHANGE = "change"
 """The label of what there is beyond a constant."""
-ROUNDING = 1e-9
-"""So far beside a boundary, in parts of its place, conditions are read that hold on one side of it; and the part of a
-capacity by which its two sides may differ where it does not jump."""
 
 
 def law_of(law: Any, branch: Branch, number: int) -> Expr:
@@ -194,7 +192,7 @@ def _jumps(capacity: Expr) -> Iterator[str]:
         for shift in (0.37, 1.9, 2.7):
             at = {one: shift * (1 + number) for number, one in enumerate(sorted(others - {symbol}, key=str))}
             low, high = _sides(capacity.xreplace(at), symbol, float(place.xreplace(at)))
-            if low.is_real and high.is_real and abs(high - low) > ROUNDING * max(abs(low), abs(high)):
+            if low.is_real and high.is_real and abs(high - low) > TYPED * max(abs(low), abs(high)):
                 shown = str(place) if place.free_symbols else f"{float(place):.6g}"
                 yield f"t = {shown} s" if symbol is TIME else f"the angle {shown}"
                 break
@@ -218,6 +216,6 @@ def _sides(capacity: Expr, symbol: Symbol, place: float) -> tuple[Expr, Expr]:
         capacity.xreplace({node: node.subs(symbol, place + offset) for node in capacity.atoms(*STEPS)}).subs(
             symbol, place
         )
-        for offset in (-ROUNDING * max(1, abs(place)), ROUNDING * max(1, abs(place)))
+        for offset in (-TYPED * max(1, abs(place)), TYPED * max(1, abs(place)))
     )
     return low, high

@@ -33,10 +33,6 @@ HIDDEN = 10.0
 """A state is hidden where its absolute tolerance is more than this many times its relative one at its largest."""
 ROUNDING = 1e-14
 """Part of the size of all states together by which a step moves each of them at random."""
-ATTEMPTS = 5
-"""A motion that was hidden altogether shows its size after two or three runs."""
-ENOUGH = 64
-"""So many outputs show how large a motion is; fewer are no reason to look at the steps of heyoka, which costs a run."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,7 +240,7 @@ def in_its_size(form: StateForm, prepared: Prepared, demand: Demand, run: Callab
         run: makes the motion.
     """
     motion = run(demand)
-    for _ in range(ATTEMPTS):
+    for _ in range(5):  # a motion that was hidden altogether shows its size after two or three runs
         sizes = None if demand.atol is not None else _hidden(motion, form, demand, prepared.atol)
         if sizes is None:
             break
@@ -280,7 +276,7 @@ def _hidden(motion: Solution, form: StateForm, demand: Demand, tolerances: Array
 
 def _largest(motion: Solution) -> dict[str, float]:
     """The largest absolute value of all that is stored."""
-    enough = motion.engine == "heyoka" or len(motion.t) >= ENOUGH
+    enough = len(motion.t) >= 64 or motion.engine == "heyoka"  # to look at its steps costs a run
     x = motion.x if enough else motion.dense(motion.steps)
     return dict(zip(motion.states, np.abs(x[:, : len(motion.states)]).max(axis=0).tolist(), strict=True))
 

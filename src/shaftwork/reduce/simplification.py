@@ -24,7 +24,7 @@ from shaftwork.reduce.reference_shaft import Referred, refer
 from shaftwork.results.measures import Measure
 from shaftwork.results.solution import Solution
 
-KEPT = 0.05
+LARGEST_DEVIATION = 0.05
 """A natural frequency is kept when the small model has it within this fraction."""
 
 
@@ -77,7 +77,7 @@ class Simplified:
         in twelve misses the torque of the kept shaft at this limit by more than 11 %, one in a hundred by more than
         17 %. What parts `by_angle` hold is not in it.
         """
-        lost = (row.before for row in self.frequencies if row.error is None or abs(row.error) > KEPT)
+        lost = (row.before for row in self.frequencies if row.error is None or abs(row.error) > LARGEST_DEVIATION)
         amplified = 0.1  # a lost mode swings along by this part at most
         return next(lost, math.inf) * math.sqrt(amplified / (1 + amplified))
 

@@ -17,6 +17,7 @@ from numpy.polynomial.polynomial import polyval
 from numpy.typing import NDArray
 
 from shaftwork.numerics.polynomials import chebyshev_nodes, lobatto_rule, to_chebyshev, to_powers, to_slopes
+from shaftwork.numerics.tolerances import CLEARANCE
 from shaftwork.numerics.zeros import Chosen, zeros
 from shaftwork.results.observer import Array, Read, blocks
 
@@ -33,14 +34,10 @@ ROUGH, FINE, EVEN = 1e-3, 1e-9, 1e-6
 
 A turn is read where the polynomial has it, so its height is right to the square of these.
 """
-TAIL, SAFETY = 3, 8.0
-"""So many last coefficients say what a polynomial misses, with this factor: those of noise are as large as all."""
 CLOSE, SHAKES = 1e-6 * np.arange(6), 20.0
 """Of a panel: times so close that only rounding bends what is read there; misses up to so many times this are noise."""
 ROUNDINGS = 100 * float(np.finfo(float).eps)
 """Of the largest value: what rounding alone makes a polynomial miss."""
-SHORTEST = 16
-"""Rounding units of time: a panel so short holds a jump, and its ends are the two sides of it."""
 LOOKS = chebyshev_nodes(32)
 """Where in a panel, from -1 to 1, its polynomial is looked at."""
 SMALLEST = 1e-6
@@ -49,7 +46,7 @@ SMALLEST = 1e-6
 Mask = NDArray[np.bool_]
 _RATES = to_slopes(NODES, NODES)
 _DEGREE = len(NODES) - 1
-_TAILS = to_chebyshev(NODES)[-TAIL:]
+_TAILS = to_chebyshev(NODES)[-3:]
 _POWERS = to_powers(NODES)
 _SLOPES = _POWERS[1:] * np.arange(1, _DEGREE + 1)[:, None]
 _BENDS = _SLOPES[1:] * np.arange(1, _DEGREE)[:, None]
@@ -174,7 +171,7 @@ def integrate(
     least = max(1, 64 // len(steps))  # panels of a step: an exact engine has few steps
     edges = np.append((steps[:-1, None] + np.diff(steps)[:, None] * np.arange(least) / least).ravel(), steps[-1])
     panels = rule.between(edges)
-    shortest = SHORTEST * np.spacing(np.abs(steps).max())
+    shortest = CLEARANCE * np.spacing(np.abs(steps).max())
     whole, first, count, before = panels.integrals(integrand(panels)), len(panels.start), 0, (np.inf, 0)
     scales = np.full(len(whole), max(size, float(np.finfo(float).tiny)))
     settled: list[tuple[LobattoPanels, Array, Array]] = []
@@ -250,7 +247,7 @@ class Course:
 def _first_largest(times: Array, values: Array) -> int:
     """Place of the largest value, and of several that are equal but for rounding the first."""
     first = int((values >= values.max() - ROUNDINGS * np.abs(values).max()).argmax())
-    there = times <= times[first] + SHORTEST * np.spacing(np.abs(times).max())
+    there = times <= times[first] + CLEARANCE * np.spacing(np.abs(times).max())
     return int(values[there].argmax())
 
 
@@ -264,7 +261,7 @@ def course(read: Read, steps: Array, *, even: bool = False) -> Course:
     """
     edges = np.unique(steps)
     panels = LobattoPanels.between(edges)
-    shortest = SHORTEST * np.spacing(np.abs(edges).max())
+    shortest = CLEARANCE * np.spacing(np.abs(edges).max())
     settled: list[tuple[LobattoPanels, Array]] = []
     end_value = float(read(edges[-1:])[0])
     low, high, count = end_value, end_value, 0
@@ -289,7 +286,8 @@ def course(read: Read, steps: Array, *, even: bool = False) -> Course:
 
 def _missed(values: Array) -> Array:
     """(p,) about how far polynomials through values (p, 8) are off."""
-    return np.asarray(SAFETY * np.abs(values @ _TAILS.T).sum(axis=1))
+    # The last three coefficients say it; eight times, as those of noise are as large as all.
+    return np.asarray(8.0 * np.abs(values @ _TAILS.T).sum(axis=1))
 
 
 def _noise(read: Read, panels: LobattoPanels) -> Array:

@@ -11,9 +11,10 @@ from sympy import Expr
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import NetworkError, SimulationError
+from shaftwork.numerics.tolerances import TYPED
 from shaftwork.pipeline.model import Model
 from shaftwork.sensitivities.differentiation import Differentiated
-from shaftwork.sensitivities.legs import LATE, SAME, Leg
+from shaftwork.sensitivities.legs import LATE, Leg
 
 if TYPE_CHECKING:
     from shaftwork.hybrid.equation_sets import EquationSets
@@ -99,7 +100,7 @@ class SensitivityTransfer:
             candidates.append((float((np.abs(states - end.after) / sizes).max(initial=0.0)), k, slopes))
         nearest = min((away for away, *_ in candidates), default=np.inf)
         if nearest <= LATE:
-            return next((k, slopes) for away, k, slopes in candidates if away <= nearest + SAME)
+            return next((k, slopes) for away, k, slopes in candidates if away <= nearest + TYPED)
         names = ", ".join(dict.fromkeys(f"'{transition.machine.name}'" for transition in transitions)) or "parts"
         raise SimulationError(
             f"At t = {after.start:.9g} s {names} change together, and how the derivatives pass that is not known here. "

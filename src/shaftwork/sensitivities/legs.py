@@ -14,6 +14,7 @@ from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.timeline import Timeline
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.problem import Problem
+from shaftwork.numerics.tolerances import SAME
 from shaftwork.numerics.zeros import LOOKS, zero
 from shaftwork.pipeline.arguments import Demand, Given
 from shaftwork.pipeline.model import Model
@@ -28,12 +29,6 @@ if TYPE_CHECKING:
     from shaftwork.hybrid.modes.mode_equations import ModeEquations
     from shaftwork.hybrid.modes.mode_machines import ModeNames
 
-SAME = 1e-9
-"""Times are equal where they differ by no more than this part of the run, and rates, derivatives, heights and states by
-no more than this part of their size: a motion is made closer, but what it leads to loses digits on the way."""
-EXACT = 1e-12
-"""Relative accuracy of the motion: what stays within this part of its largest size is on no side, what is so near to
-the end of a leg is at it, and what changes as slowly as a part of the largest rates is known so much worse."""
 LATE = 1e-5
 """The run meets limits late by what rounding moves them, which is much for what hardly moves any more: by up to this
 part of the run, with states that are off by up to this part of their size."""
@@ -105,7 +100,7 @@ def _turned(leg: Leg, equations: Differentiated) -> Iterator[tuple[float, int]]:
     times = np.append((leg.steps[:-1, None] + np.diff(leg.steps)[:, None] * np.append(0.0, LOOKS)).ravel(), leg.end)
     values = equations.turning(*leg.read(times), leg.p)
     for number, column in enumerate(values.T):
-        sided = np.flatnonzero(np.abs(column) > EXACT * np.abs(column).max(initial=0.0))
+        sided = np.flatnonzero(np.abs(column) > SAME * np.abs(column).max(initial=0.0))
         for k in np.flatnonzero(np.diff(np.sign(column[sided]))).tolist():
 
             def course(t: Array, number: int = number) -> Array:

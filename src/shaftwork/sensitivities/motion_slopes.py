@@ -21,12 +21,13 @@ from shaftwork.core.errors import AccuracyWarning, ParameterError, SimulationErr
 from shaftwork.core.notices import warn
 from shaftwork.formulation.observables import Observables
 from shaftwork.numerics.polynomials import to_integrals
+from shaftwork.numerics.tolerances import SAME, TYPED
 from shaftwork.numerics.zeros import zero
 from shaftwork.pipeline.model import Model
 from shaftwork.results.observer import blocks
 from shaftwork.sensitivities.carrying import End, SensitivityTransfer
 from shaftwork.sensitivities.differentiation import Differentiated, ValueWithSlopes, rows_of
-from shaftwork.sensitivities.legs import EXACT, SAME, DifferentiatedMotion, Leg, parted
+from shaftwork.sensitivities.legs import DifferentiatedMotion, Leg, parted
 from shaftwork.sensitivities.saltation import ADVICE, Jump, JumpConditions, by_chance
 
 if TYPE_CHECKING:
@@ -251,7 +252,7 @@ class MotionSlopes:
         for k, leg in enumerate(self.legs):
             if k:
                 jump = jumps.over(self.legs[k - 1], leg, slopes, self._transitions(leg))
-                if last is not None and self.legs[k - 1].end - self.legs[k - 1].start <= SAME * length:
+                if last is not None and self.legs[k - 1].end - self.legs[k - 1].start <= TYPED * length:
                     self._refuse_chance(leg, last, jump, length)
                 slopes, last = jump.slopes, jump
                 self._shifts.append(jump.shift)
@@ -320,7 +321,7 @@ class MotionSlopes:
             SimulationError: several changes come together there, and it is not known which one counts.
         """
         number = int(self._leg_at(np.array([t]))[0])
-        leg, near = self.legs[number], EXACT * (self.legs[-1].end - self.legs[0].start)
+        leg, near = self.legs[number], SAME * (self.legs[-1].end - self.legs[0].start)
         times, states = leg.read(np.array([t]))
         shown = self._shown(quantity, leg)
         by_states, by_parameters, _ = shown.slopes(float(times[0]), states[0], leg.p)
@@ -347,7 +348,7 @@ class MotionSlopes:
         aside = 1e-3 * (leg.steps[k] - leg.steps[k - 1])
         low, high = max(t - aside, leg.low), min(t + aside, leg.high)
         if self._rate(quantity, leg, low) * self._rate(quantity, leg, high) < 0:
-            return zero(lambda time: np.array([self._rate(quantity, leg, time[0])]), low, high, xtol=aside * EXACT)
+            return zero(lambda time: np.array([self._rate(quantity, leg, time[0])]), low, high, xtol=aside * SAME)
         return t
 
     def _shown(self, quantity: str, leg: Leg) -> ValueWithSlopes:

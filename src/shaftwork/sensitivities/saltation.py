@@ -21,10 +21,11 @@ from sympy import Expr
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import SimulationError
+from shaftwork.numerics.tolerances import SAME, TYPED
 from shaftwork.pipeline.model import Model
 from shaftwork.sensitivities.carrying import End, SensitivityTransfer
 from shaftwork.sensitivities.differentiation import Differentiated
-from shaftwork.sensitivities.legs import EXACT, LATE, SAME, Leg
+from shaftwork.sensitivities.legs import LATE, Leg
 
 if TYPE_CHECKING:
     from shaftwork.hybrid.hybrid_state import Transition
@@ -170,7 +171,7 @@ class JumpConditions:
             end, total = single[k], np.concatenate([carried, single[k].total[len(old.x) :]])
         new_slopes = self._later(end.new, total - np.outer(end.new.rates, end.shift), end.late)
         share = self._share(before.model, slopes, new_slopes) if adds else 1.0
-        return Jump(new_slopes, end.shift, adds, EXACT / end.pace * share)
+        return Jump(new_slopes, end.shift, adds, SAME / end.pace * share)
 
     def _crossing(self, old: _Side, new: _Side, slopes: Array, causes: Sequence[_Cause], late: float) -> _Crossing:
         """The instant as it is when both sides are gone back by so much, in s."""
@@ -218,7 +219,7 @@ class JumpConditions:
             yield _Cause(argument)
         instant = leg.model.switching.passed(leg.p, leg.high, new.leg.low, modes=True)
         met = sorted(self._met(old, transitions), key=lambda pair: pair[0])
-        near = [SAME if instant or k else LATE for k in range(len(met))]
+        near = [TYPED if instant or k else LATE for k in range(len(met))]
         caused = [cause for (away, cause), most in zip(met, near, strict=True) if away <= most * self._span]
         if transitions and not (caused or instant):
             raise SimulationError(
@@ -261,7 +262,7 @@ class JumpConditions:
             return np.zeros(len(moved)), 1.0
         rate = float(by_states @ old.rates[:size] + by_time)
         most = float(np.abs(by_states) @ self._swiftest(old.leg.model)[:size] + abs(by_time))
-        if not abs(rate) > SAME * most:
+        if not abs(rate) > TYPED * most:
             raise _touched(old.leg, _worded(cause))
         return -moved / rate, abs(rate) / most
 
@@ -270,7 +271,7 @@ class JumpConditions:
         groups: list[_TiedTimes] = []
         for cause in causes:
             shift, pace = self._shift(old, slopes, cause)
-            alike = (k for k, one in enumerate(groups) if (np.abs(one.shift - shift) <= SAME * np.abs(shift)).all())
+            alike = (k for k, one in enumerate(groups) if (np.abs(one.shift - shift) <= TYPED * np.abs(shift)).all())
             k = next(alike, None)
             if k is None:
                 groups.append(_TiedTimes(shift, pace, [cause]))
@@ -289,7 +290,7 @@ class JumpConditions:
             gained = self._after(old, new, group.causes) - old.rates
             total -= np.outer(gained, group.shift)
             rates += gained
-        if not adds or (np.abs(rates - new.rates) > SAME * self._swiftest(old.leg.model)).any():
+        if not adds or (np.abs(rates - new.rates) > TYPED * self._swiftest(old.leg.model)).any():
             raise by_chance(new.leg, " and ".join(_worded(group.causes[0]) for group in groups))
         return total
 

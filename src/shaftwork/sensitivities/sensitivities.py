@@ -17,6 +17,7 @@ from shaftwork.components.law_slopes import slope
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.errors import ParameterError, SimulationError
+from shaftwork.numerics.tolerances import TYPED
 from shaftwork.pipeline.arguments import Given, Point, Time, by_name, relative_tolerance, time_span
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import refuse_motion
@@ -26,7 +27,7 @@ from shaftwork.results.measures import EXTREMES, KINDS, POWERS, Measure
 from shaftwork.results.observer import Complex
 from shaftwork.results.solution import Solution
 from shaftwork.sensitivities.differentiation import SlopeMatrix, rows_of
-from shaftwork.sensitivities.legs import SAME, motion_of
+from shaftwork.sensitivities.legs import motion_of
 from shaftwork.sensitivities.motion_slopes import MotionSlopes
 from shaftwork.sensitivities.sensitivity_tables import FrequencySensitivities, MotionSensitivities
 
@@ -229,7 +230,7 @@ def measured(
 def _extreme(measure: Measure, slopes: MotionSlopes) -> tuple[float, Array]:
     turns = turning_points(lambda times: slopes.values(measure.quantity, times), slopes.steps, smallest=SMALLEST)
     heights = {"max": turns.values, "min": -turns.values, "peak": np.abs(turns.values)}[measure.kind]
-    level = heights.max() - SAME * float(np.ptp(turns.values))
+    level = heights.max() - TYPED * float(np.ptp(turns.values))
     highest = np.flatnonzero(heights >= level).tolist()
     signs = np.sign(turns.values) if measure.kind == "peak" else np.ones(len(turns.values))
     times = [slopes.turning(measure.quantity, float(turns.t[k])) for k in highest]
@@ -336,7 +337,7 @@ def _moved(model: Model, names: Sequence[str], initial: Given, span: tuple[float
     states, start = _start(model, {}, initial, span)
     shift = 1e-3  # by which part each parameter is made smaller
     other = _start(model, {name: value * (1 - shift) for name, value in values.items()}, initial, span)[1]
-    far = np.abs(other - start) > SAME * shift * np.abs(start).max(initial=0.0)
+    far = np.abs(other - start) > TYPED * shift * np.abs(start).max(initial=0.0)
     return tuple(name for name, moves in zip(states, far.tolist(), strict=True) if moves)
 
 

@@ -12,9 +12,10 @@ import numpy as np
 
 from shaftwork.core.errors import ParameterError, imported
 from shaftwork.core.parameters import in_si
+from shaftwork.numerics.tolerances import SAME
 from shaftwork.results.course import LobattoPanels, integrate, turning_points
 from shaftwork.results.observer import RPM, Array
-from shaftwork.sizing.motor_shaft import REST, SMALLEST, MotorShaft, motor_shaft, run_up
+from shaftwork.sizing.motor_shaft import SMALLEST, MotorShaft, motor_shaft, run_up
 from shaftwork.sizing.reserve import Limit, Reserve, reserve_of, speed_torque_plane
 
 if TYPE_CHECKING:
@@ -311,7 +312,7 @@ def duty(
     shaft = motor_shaft(solution, motor, (torque, speed), (ratio, efficiency), released=at_rest == "released")
     motion = float(shaft.steps[-1] - shaft.steps[0])
     whole = motion if cycle is None else in_si("cycle", cycle, "s", above=0)
-    if whole < motion * (1 - REST):
+    if whole < motion * (1 - SAME):
         raise ParameterError(f"cycle = {whole:g} s is shorter than the motion of {motion:g} s. Simulate less of it.")
     cold = in_si("cooling", cooling, above=0, at_most=1)
     n_full = shaft.omega_top * RPM if n_cooling is None else in_si("n_cooling", n_cooling, "1/min", above=0)

@@ -13,20 +13,18 @@ from numpy.typing import NDArray
 
 from shaftwork.core.errors import ParameterError, imported
 from shaftwork.core.parameters import in_si
+from shaftwork.numerics.tolerances import SAME
 from shaftwork.results.course import LobattoPanels
 from shaftwork.results.observer import RPM, Array
 from shaftwork.sizing.catalogue import SHOWN, CatalogueMotor, catalogue
 from shaftwork.sizing.duty import Duty, cooling_at
-from shaftwork.sizing.motor_shaft import REST, SMALLEST, zeros
+from shaftwork.sizing.motor_shaft import SMALLEST, zeros
 from shaftwork.sizing.reserve import speed_torque_plane
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-OVERLOAD = 1.3
-"""Pull-out torque over the largest torque that is asked for: chosen, what drive practice leaves for voltage drops and
-the tolerance of 10 % that IEC 60034-1 gives the pull-out torque."""
 UNCHECKED = (
     "heat beyond equal copper losses: iron and friction, ambient temperature, altitude, harmonics of the inverter",
     "the inverter's own current and voltage limits",
@@ -164,7 +162,7 @@ def choose(
     duty: Duty,
     motors: str | Path | Sequence[CatalogueMotor] | None = None,
     *,
-    overload: Any = OVERLOAD,
+    overload: Any = 1.3,
     rotor: Any = 0.0,
 ) -> Choice:
     """Judge every motor of a catalogue for a prescribed motion, fed by an inverter that keeps voltage over frequency.
@@ -178,7 +176,8 @@ def choose(
     Args:
         duty: what is asked.
         motors: path of a CSV file, or motors; by default those of the package, which are typical and no maker's.
-        overload: least ratio of what it can give to what is asked.
+        overload: least ratio of what it can give to what is asked: practice leaves so much for voltage drops and
+            the 10 % by which IEC 60034-1 lets the pull-out torque fall short.
         rotor: inertia in kg m^2, at the motor's shaft, of a rotor that the motion already has in it.
 
     Raises:
@@ -240,7 +239,7 @@ def _demand(duty: Duty, rated: Array) -> _Demand:
     tau, omega = (values.reshape(shape) for values in shaft.read(panels.times.ravel()))
     # Shorter panels close in a jump: slopes in them are those of rounding.
     lasting = panels.length > 1e-5 * panels.length.sum()
-    on = np.abs(tau) > REST * duty.tau_peak  # what is switched off accelerates nothing
+    on = np.abs(tau) > SAME * duty.tau_peak  # what is switched off accelerates nothing
     return _Demand(duty, panels, tau, np.where(on, panels.slopes(omega), 0.0), np.abs(omega) * RPM, lasting)
 
 

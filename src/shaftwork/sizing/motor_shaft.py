@@ -17,7 +17,7 @@ from shaftwork.components.sources import SpeedSource
 from shaftwork.core.errors import ParameterError, SignalError
 from shaftwork.core.parameters import in_si
 from shaftwork.network.netlist import at_nodes, listed
-from shaftwork.numerics.tolerances import EPS
+from shaftwork.numerics.tolerances import EPS, SAME
 from shaftwork.results.course import LobattoPanels, turning_points
 from shaftwork.results.observer import Array, Read, blocks
 from shaftwork.results.solution import Solution
@@ -25,9 +25,6 @@ from shaftwork.results.solution import Solution
 SMALLEST = 1e-9
 """Less than this part of a range, a cycle or a limit is none: ups and downs make no peak, jumps take no time, and what
 is above a limit by it is not above it."""
-REST = 1e-12
-"""A speed that stays within this part of the highest one may be standstill, such a torque none: see `is_nothing`. Times
-that differ by this part of a motion are one."""
 CONSTANT, FLAT = 4 * EPS, 45 * EPS
 """What changes by no more than this part of itself is constant; a step in which the speed changes by no more than this
 part of the highest one is part of a plateau."""
@@ -112,14 +109,14 @@ class MotorShaft:
     @cached_property
     def resting(self) -> NDArray[np.bool_]:
         """(s - 1,) whether the motor is at standstill from one end of a step to the other."""
-        return is_nothing(self.speeds_within, REST * self.omega_top)
+        return is_nothing(self.speeds_within, SAME * self.omega_top)
 
     @cached_property
     def unloaded(self) -> NDArray[np.bool_]:
         """(s - 1,) whether the motor has no torque from one end of a step to the other."""
         times = self.within.times
         tau = self.read(times.ravel())[0].reshape(times.shape)
-        return is_nothing(tau, REST * float(np.abs(tau).max()))
+        return is_nothing(tau, SAME * float(np.abs(tau).max()))
 
     def step_at(self, times: Array) -> NDArray[np.intp]:
         """(k,) the step in which each time is; the end of one is the start of the next."""
@@ -292,7 +289,7 @@ def _first(shaft: MotorShaft, times: Array, goal: float) -> float:
 def _top(shaft: MotorShaft, marks: Array) -> float:
     """Where the highest speed begins: the start of a plateau, else its peak, among ends of steps and turning points."""
     speeds = np.abs(shaft.omega(marks))
-    near = speeds >= shaft.omega_top * (1 - REST)
+    near = speeds >= shaft.omega_top * (1 - SAME)
     first = int(np.argmax(near))
     beyond = np.flatnonzero(~near[first:])
     here = slice(first, first + int(beyond[0]) if beyond.size else None)
@@ -309,7 +306,7 @@ def _start(shaft: MotorShaft, times: Array) -> float:
     speeds = shaft.omega(times)
     ends = shaft.steps[1:][shaft.resting]
     standstills: list[float] = [float(times[0]), *ends[ends <= times[-1]].tolist()]
-    touches = np.flatnonzero(np.abs(speeds) <= REST * shaft.omega_top)
+    touches = np.flatnonzero(np.abs(speeds) <= SAME * shaft.omega_top)
     if touches.size:
         last = touches[np.flatnonzero(np.diff(touches, prepend=-2) > 1)[-1] :]  # a soft start stays near zero
         sizes = np.abs(speeds[last])

@@ -11,20 +11,13 @@ from scipy.interpolate import PchipInterpolator
 
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
-from shaftwork.core.screen import in_columns
+from shaftwork.core.screen import ROWS, in_columns
 from shaftwork.results.observer import RPM, Array, Reader, span_of
 from shaftwork.results.plotting import new_figure, plain
 from shaftwork.spectra.spectrum import MOST, number_of, refined, windowed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-SAMPLES = 20_001
-"""Of the speed, from which the angle is integrated."""
-OVERSAMPLED = 4
-"""Samples per turn to begin with, as multiples of the highest order: twice what the sampling theorem needs."""
-SHOWN = 10
-"""Rows in the table."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +61,7 @@ class OrderSpectra:
         largest = self.amplitudes.max(axis=0)
         rows = [
             [f"{self.orders[k]:.4g}", f"{largest[k]:.5g}", f"{self.speeds[self.amplitudes[:, k].argmax()] * RPM:.5g}"]
-            for k in np.argsort(-largest, kind="stable")[:SHOWN]
+            for k in np.argsort(-largest, kind="stable")[:ROWS]
         ]
         title = f"{self.name} in '{self.title}' over {self.speed}: {len(self.times)} order spectra, largest lines"
         return "\n".join([title, *in_columns([["order", self.unit, "at 1/min"], *rows])])
@@ -107,7 +100,7 @@ def order_spectra(
     turning, highest = in_si("turns", turns, "1"), in_si("order_max", order_max, "1")
     if not (turning > 0.0 and highest > 1.0 / turning):
         raise ParameterError(f"turns = {turns!r}, order_max = {order_max!r}: both above 0, order_max above 1 / turns.")
-    times = np.linspace(first, last, SAMPLES)
+    times = np.linspace(first, last, 20_001)
     speeds = reader.quantity(speed)(times)
     way = np.sign(speeds[len(speeds) // 100])  # shortly after the start, which may be a standstill
     if (wrong := speeds * way <= 0.0).any():
@@ -127,7 +120,7 @@ def order_spectra(
         at = when(starts[:, None] + turning / count * np.arange(count))
         return windowed(read(at.ravel()).reshape(at.shape))
 
-    fewest = int(np.ceil(OVERSAMPLED * highest * turning))
+    fewest = int(np.ceil(4 * highest * turning))  # twice what the sampling theorem needs
     most = max(fewest, MOST // len(starts))
     amplitudes = refined(sampled, fewest, most, f"the order spectra of '{name}' over {turning:g} turns")
     orders = np.arange(amplitudes.shape[1]) / turning

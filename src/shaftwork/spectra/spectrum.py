@@ -14,7 +14,7 @@ from scipy.signal.windows import hann
 from shaftwork.core.errors import AccuracyWarning, ParameterError
 from shaftwork.core.notices import warn
 from shaftwork.core.parameters import in_si
-from shaftwork.core.screen import in_columns
+from shaftwork.core.screen import ROWS, in_columns
 from shaftwork.numerics.tolerances import GOLDEN
 from shaftwork.results.observer import Array, Reader, span_of
 from shaftwork.results.plotting import new_figure
@@ -24,11 +24,6 @@ if TYPE_CHECKING:
 
 FEWEST, MOST = 2**12, 2**20
 """Samples of a span."""
-FOLDED = 1e-3
-"""Of the largest amplitude: by how much more samples may change the others. What swings too fast for samples appears at
-a frequency that it does not have, and at another one with more of them."""
-SHOWN = 10
-"""Peaks in the table."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +55,7 @@ class Spectrum:
         return tuple((float(self.frequencies[place]), float(self.amplitudes[place])) for place in ranked)
 
     def __str__(self) -> str:
-        rows = [[f"{f:.6g}", f"{amplitude:.5g}"] for f, amplitude in self.peaks[:SHOWN]]
+        rows = [[f"{f:.6g}", f"{amplitude:.5g}"] for f, amplitude in self.peaks[:ROWS]]
         title = f"{self.name} in '{self.title}': peaks of the spectrum, lines {self.frequencies[1]:.4g} Hz apart"
         return "\n".join([title, *in_columns([["Hz", self.unit], *rows])])
 
@@ -117,7 +112,8 @@ def refined(sampled: Callable[[int], Array], fewest: int, most: int, what: str) 
         lines = amplitudes.shape[-1] - 1  # without the last one, where both sides of the half fall together
         off = np.abs(finer[..., :lines] - amplitudes[..., :lines]).max(initial=0.0)
         fewer, amplitudes, count = count, finer, more
-        if off <= FOLDED * np.abs(finer).max(initial=0.0):
+        # What swings too fast for the samples appears at a false frequency, and with more of them at another one.
+        if off <= 1e-3 * np.abs(finer).max(initial=0.0):
             return amplitudes
         if count >= most:
             warn(

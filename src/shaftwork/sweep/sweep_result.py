@@ -15,7 +15,7 @@ from shaftwork.core.errors import ParameterError, imported
 from shaftwork.core.files import replaced
 from shaftwork.core.notebook import html_table
 from shaftwork.core.parameters import whole
-from shaftwork.core.screen import counted
+from shaftwork.core.screen import ROWS, counted
 from shaftwork.results.observer import Array
 from shaftwork.results.plotting import new_figure
 
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-SHOWN = 12
-"""Rows of a printed table."""
 VERDICTS = ("passed", "reason")
 """Columns of the table behind those of parameters and measures."""
 
@@ -157,7 +155,7 @@ class Sweep:
         return counts, ["", *columns, "passed", "reason" if any(self.reasons) else ""], rows
 
     def __str__(self) -> str:
-        counts, header, rows = self._rows(SHOWN)
+        counts, header, rows = self._rows(ROWS)
         widths = [max(len(row[column]) for row in [header, *rows]) for column in range(len(header))]
         lines = [
             "  ".join(
@@ -165,7 +163,7 @@ class Sweep:
             ).rstrip()
             for row in [header, *rows]
         ]
-        more = [f"and {len(self) - SHOWN} more"] if len(self) > SHOWN else []
+        more = [f"and {len(self) - ROWS} more"] if len(self) > ROWS else []
         return "\n".join([counts, *lines, *more])
 
     def _repr_html_(self) -> str:

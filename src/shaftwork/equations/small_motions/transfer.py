@@ -29,7 +29,7 @@ from shaftwork.equations.small_motions.tableau import (
     with_laws,
 )
 from shaftwork.formulation.form import Names
-from shaftwork.formulation.gains import LONGEST
+from shaftwork.formulation.gains import LARGEST_DENOMINATOR
 from shaftwork.formulation.source_inputs import places_of, with_inputs
 
 if TYPE_CHECKING:
@@ -267,5 +267,9 @@ def _readable(polynomial: Poly, first: Expr) -> Expr:
 
 
 def _rounded(coefficient: Expr) -> Expr:
-    long = (number for number in coefficient.atoms(Rational) if number.q > LONGEST or abs(number.p) > LONGEST**2)
+    long = (
+        number
+        for number in coefficient.atoms(Rational)
+        if number.q > LARGEST_DENOMINATOR or abs(number.p) > LARGEST_DENOMINATOR**2
+    )
     return coefficient.xreplace({number: Float(number) for number in long})
