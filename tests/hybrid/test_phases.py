@@ -285,26 +285,26 @@ def test_an_end_of_a_mode_that_the_series_have_hidden_is_told() -> None:
     event_iteration = EventIteration(model().equation_sets, {}, (0.0, 10.0))
     regime = event_iteration.transfer.regime(("open", "forward", "released"))
     size, bands = len(regime.equations.model.states), [1e-12] * len(regime.sides)
-    passing = InPlaceEvents(event_iteration, HybridState(regime, np.zeros(size), bands), 0.0, lambda _t, _made: None)
+    events = InPlaceEvents(event_iteration, HybridState(regime, np.zeros(size), bands), 0.0, lambda _t, _made: None)
     twist = regime.equations.model.states.index("gap.phi")
     within = np.ones(size)
     within[twist] = 0.0
     beyond = np.ones(size)
-    passing.refuse_missed(None, 1.0, within)
+    events.refuse_missed(None, 1.0, within)
     with pytest.raises(SeriesError, match="has not seen that 'gap' ceased to be open before t = 1 s"):
-        passing.refuse_missed(None, 1.0, beyond)
-    passing.refuse_missed(next(made.guard for made in regime.watched if made.leave.to == "forward"), 1.0, beyond)
+        events.refuse_missed(None, 1.0, beyond)
+    events.refuse_missed(next(made.guard for made in regime.watched if made.leave.to == "forward"), 1.0, beyond)
 
 
 def test_the_rates_of_many_instants_are_those_of_each() -> None:
     event_iteration = EventIteration(model().equation_sets, {}, (0.0, 10.0))
     regime = event_iteration.transfer.regime(("forward", "forward", "released"))
     x = np.random.default_rng(0).normal(size=(5, len(regime.equations.model.states)))
-    moment = HybridState(regime, x[0], [0.0] * len(regime.sides))
-    problem = moment.problem((0.0, 10.0), regime.equations.model.switching.timeline(regime.p, 0.0, 10.0))
+    state = HybridState(regime, x[0], [0.0] * len(regime.sides))
+    problem = state.problem((0.0, 10.0), regime.equations.model.switching.timeline(regime.p, 0.0, 10.0))
     times = np.linspace(0.1, 0.9, 5)
     assert problem.rates is not None
-    each = [problem.rhs(t, state) for t, state in zip(times.tolist(), x, strict=True)]
+    each = [problem.rhs(t, row) for t, row in zip(times.tolist(), x, strict=True)]
     np.testing.assert_allclose(problem.rates(times, x), each, rtol=1e-12, atol=1e-12)
 
 
@@ -313,10 +313,10 @@ def test_a_wheel_slips_in_the_way_it_is_pulled_where_the_rounding_of_a_moment_is
     event_iteration = EventIteration(net.compile().equation_sets, {}, (0.0, 10.0))
     regime = event_iteration.transfer.regime(("stuck",))
     met = next(made.guard for made in regime.watched if made.leave.to == "forward")
-    moment = HybridState(regime, np.zeros(len(regime.equations.model.states)))
-    moment, changes = event_iteration.run(0.0, 0.0, moment, met)
-    assert [(change.before, change.after) for change in changes] == [("stuck", "forward")]
-    assert moment.regime.modes == ("forward",)
+    state = HybridState(regime, np.zeros(len(regime.equations.model.states)))
+    state, transitions = event_iteration.run(0.0, 0.0, state, met)
+    assert [(transition.before, transition.after) for transition in transitions] == [("stuck", "forward")]
+    assert state.regime.modes == ("forward",)
 
 
 @pytest.mark.slow

@@ -205,7 +205,7 @@ class Component:
         raise NotImplementedError
 
     def modes(self, p: Any) -> Iterator[Modes]:  # noqa: ARG002
-        """Yield the elements of the part that change their mode, each with its modes; by default there are none."""
+        """Yield the modes of each mode machine in the part; by default there are none."""
         yield from ()
 
     def derived(self, p: Any) -> Iterator[Derived]:  # noqa: ARG002

@@ -5,8 +5,8 @@ own. Two modes of the same *form* have the same branches and differ in one numbe
 `p.mode`; so they share equations and compiled code. Another form has other branches, a rigid joint for instance, and so
 the network has other equations. A network makes those of a combination of forms when a motion first comes there.
 
-`Component.branches` finds the form as `p.form` and the number as `p.mode`; of an element with a label as
-`p.form_<label>` and `p.mode_<label>`.
+What has modes is a mode machine: a part, or a piece of one. `Component.branches` finds the form of its mode as `p.form`
+and the number as `p.mode`; of a machine with a label as `p.form_<label>` and `p.mode_<label>`.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ ANEW = ""
 
 @dataclass(frozen=True)
 class Leave:
-    """What ends a mode.
+    """What ends a mode: a guard, and the mode that follows.
 
     Args:
-        when: the mode ends where this rises above zero. It may contain, beside the part's parameters and the time,
-            ACROSS, THROUGH and INTEGRAL of the element (see `Modes`), `p.mode`, and `across_of`, `through_of` and
+        when: the guard: the mode ends where it rises above zero. It may contain, beside the part's parameters and the
+            time, ACROSS, THROUGH and INTEGRAL of the machine (see `Modes`), `p.mode`, and `across_of`, `through_of` and
             `integral_of`.
         to: name of the mode that follows; `ANEW` stands for the one in which a motion would start there.
-        rebound: of an impact, the share of the speed across the element that comes back after it. The element is joined
-            rigidly for an instant, by the form of `to`, and is thrown back unless the speed is below `rest`; then the
+        rebound: of an impact, the share of the speed across the machine that comes back after it. The machine is rigid
+            for an instant, by the form of `to`, and is thrown back unless the speed is below `rest`; then the
             mode that follows is `to`, otherwise the one before goes on.
         rest: speed below which there is no rebound, in the unit of the across variable.
     """
@@ -62,7 +62,7 @@ class Leave:
 
     @cached_property
     def by_speed(self) -> bool:
-        """Whether the mode ends as the speed across the element passes through zero."""
+        """Whether the mode ends as the speed across the machine passes through zero."""
         return self.when in (ACROSS, -ACROSS)
 
     @cached_property
@@ -76,23 +76,23 @@ class Leave:
         return self.by_twist and not self.when.has(INTEGRAL) and self.when.has(TIME)
 
     def _reads(self, variable: Symbol) -> bool:
-        """Whether a variable of the element, ACROSS or THROUGH, or the same of another branch stands in the guard."""
+        """Whether a variable of the machine, ACROSS or THROUGH, or the same of another branch stands in the guard."""
         return any(symbol == variable or named_in(symbol)[0] == variable.name for symbol in self.when.free_symbols)
 
 
 @dataclass(frozen=True)
 class Mode:
-    """One way in which an element works.
+    """One way in which a mode machine works.
 
     Args:
-        name: of its own among the modes of the element.
+        name: of its own among the modes of the machine.
         leaves: what ends it.
         value: the number that stands in the laws as `p.mode`.
         form: which branches the part has; modes of equal form share equations.
         starts: a motion begins in the first mode whose condition holds, in ACROSS, INTEGRAL and the time; in the first
             of all where none does.
         says: how phases of a motion and events call it; modes that say the same are told apart inside only.
-        at_rest: the form in place of `form` where nothing moves across the element, as others hold both of its ends;
+        at_rest: the form in place of `form` where nothing moves across the machine, as others hold both of its ends;
             None where its laws are the same then.
     """
 
@@ -136,14 +136,14 @@ class Mode:
 
 @dataclass(frozen=True)
 class Modes:
-    """The modes of an element, which is a part or a piece of one that changes its mode on its own.
+    """The modes of a mode machine, which is a part or a piece of one that changes its mode on its own.
 
     Args:
-        options: the modes. In the first the element joins nothing rigidly: in it a network is printed and checked, and
+        options: the modes. In the first the machine is not rigid: in it a network is printed and checked, and
             the state at the start of a motion is read.
         ends: the ports that ACROSS is of (the first less the second); THROUGH is what the first one gives to the part.
         angle: label of the branch that INTEGRAL is of, in all forms; by default the only one that reads it.
-        label: of the element, where the part has several.
+        label: of the machine, where the part has several.
     """
 
     options: tuple[Mode, ...]
@@ -191,7 +191,7 @@ class Modes:
 
 @dataclass(frozen=True)
 class ModeChoice:
-    """What is chosen for an element when branches are made: a form, and a number or None for a parameter.
+    """What is chosen for a mode machine when branches are made: a form, and a number or None for a parameter.
 
     Args:
         form: of the mode.
@@ -203,7 +203,7 @@ class ModeChoice:
 
 
 def mode_symbol(name: str) -> Symbol:
-    """The symbol of the number of an element's mode, by its name in `p`."""
+    """The symbol of the number of a machine's mode, by its name in `p`."""
     return Symbol(name, real=True)
 
 

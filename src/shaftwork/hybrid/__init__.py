@@ -1,9 +1,20 @@
 """Hybrid motions: smooth phases, in each of which every part keeps its mode, and the events between them.
 
-How an event is handled: an engine integrates the equations of the modes until it locates the instant at which one of
-their guards rises through zero. There the event iteration changes the mode whose guard is farthest beyond zero, and
-what is stored goes over to the equations of the new modes, by an impact where something rigid closes with a speed;
-this repeats until every guard is within its limit or about to fall, and the engine goes on in these equations.
+How an event is handled:
+
+1. An engine integrates the equations of the modes, `modes.mode_equations`, until one of their guards rises through
+   zero: `hybrid_run`, and `integrate.guards` or `codegen.taylor.heyoka` for the instant.
+2. Where that guard by itself leads to other numbers in the same equations, the engine goes on past it at once:
+   `in_place_events`.
+3. Otherwise `event_iteration` makes the transition of the guard that is farthest beyond its limit, `hybrid_state`, and
+   diodes and freewheels take over what it would cut off, `commutation`.
+4. All that is stored goes over to the equations of the new modes, `hybrid_transfer` and `codegen.state_transfer`, which
+   `equation_sets` makes when a motion first needs them.
+5. Where something rigid closes with a speed, an impact comes first and may throw it back: `impacts.impacts`.
+6. Steps 3 to 5 repeat until every guard is within its limit, or on it and about to fall, `consistency`, and the engine
+   goes on.
+
+Where what is:
 
     modes and guards    modes.mode_machines             parts with their modes, and the guards that end these
     mode equations      modes.mode_equations            the equations and guards of a combination of modes
@@ -13,7 +24,8 @@ this repeats until every guard is within its limit or about to fall, and the eng
     location            hybrid_run                      runs an engine from one stop to the next
                         integrate.guards                where a step of scipy, SUNDIALS or a wave meets a guard
                         codegen.taylor.heyoka           guards as events of the Taylor series
-    event iteration     event_iteration                 modes change one after another until they are consistent
+    in-place event      in_place_events                 where only numbers in the equations change, without a stop
+    event iteration     event_iteration                 one transition after another until the modes are consistent
                         consistency                     the rule that tells whether a guard allows a mode to go on
                         hybrid_state                    modes and states at an instant, and which guards are exceeded
                         commutation                     diodes that take over what a switch would cut off
@@ -22,10 +34,9 @@ this repeats until every guard is within its limit or about to fall, and the eng
     impact              impacts.impacts                 speeds that jump where parts meet
                         impacts.collisions              the complementarity problem of their impulses
                         impacts.impulses                impulses on their way through gears that rub
-    in-place event      in_place_events                 where only numbers in the equations change, without a stop
 
 A `Regime` is a combination of modes with its equations and the parameters of a run, a `HybridState` a regime with
 states. `hybrid_model` is what a user calls, `hybrid_solution` reads a motion, `named_phases` finds a phase by its name,
 `waves.hybrid_waves` joins travelling waves to a motion and `sweep.hybrid_ensemble` takes many variants side by side
-through their events.
+through their events. docs/glossary.md has the words.
 """

@@ -1,4 +1,4 @@
-"""Commutation: diodes and freewheels that take over a current or torque which a change of mode would cut off."""
+"""Commutation: diodes and freewheels that take over a current or torque which a transition would cut off."""
 
 from __future__ import annotations
 
@@ -10,12 +10,9 @@ from sympy import Expr
 
 from shaftwork.components.branches import ACROSS, THROUGH
 from shaftwork.core.errors import NetworkError
-from shaftwork.hybrid.hybrid_state import Change, HybridState, Transition, exceeded
+from shaftwork.hybrid.hybrid_state import EventOutcome, HybridState, Transition, exceeded
 from shaftwork.hybrid.hybrid_transfer import HybridTransfer, mode_anew
 from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, ModeMachine, ModeNames, with_modes
-
-MOST = 500
-"""So many sets of diodes are tried at one instant, the smallest first: all of a circuit with eight of them."""
 
 
 class Commutation:
@@ -28,24 +25,25 @@ class Commutation:
     def __init__(self, transfer: HybridTransfer) -> None:
         self._transfer, self._machines = transfer, transfer.machines
 
-    def commutated(self, state: HybridState, t: float, modes: ModeNames) -> tuple[HybridState, dict[int, str]]:
-        """The modes that are wanted, and what then takes over a torque or current that they would cut off."""
-        plain = self._transfer.to_modes(state, t, modes)
+    def commutated(self, t: float, after: float, state: HybridState, changed: dict[int, str]) -> EventOutcome:
+        """Machines pass to other modes, and diodes and freewheels to those in which they take over what is cut off."""
+        modes = with_modes(state.regime.modes, changed)
+        plain = self._transfer.to_modes(state, after, modes)
         names = plain.regime.stores.through
-        if plain.x is not state.x and names and not self._keeps(t, state, plain, names):
-            for other, changed in self._keeping(t, state, modes, takeovers(self._machines, modes), names):
-                if not exceeded(other, t, other)[1]:
-                    return other, changed
-        return plain, {}
+        if plain.x is not state.x and names and not self._keeps(after, state, plain, names):
+            for other, led in self._keeping(after, state, modes, takeovers(self._machines, modes), names):
+                if not exceeded(other, after, other)[1]:
+                    return other, self._transitions(t, state, changed | led)
+        return plain, self._transitions(t, state, changed)
 
-    def switched(self, t: float, after: float, state: HybridState, number: int, to: str) -> Transition | None:
+    def switched(self, t: float, after: float, state: HybridState, number: int, to: str) -> EventOutcome | None:
         """A switch changes, with all others whose time it is too, and diodes so that all that is stored goes on.
 
         None where that is not possible: a current is cut off, or a capacitor is charged at once. Of several switches
         those that open do so before others close then.
         """
         modes, changed = state.regime.modes, {number: to}
-        now, bands = state.regime.limits(after, state.x.tolist()), state.bands
+        now, bands = state.regime.guards_at(after, state.x.tolist()), state.bands
         for active in state.regime.watched:
             k = active.machine
             met = active.leave.by_time and active.side * now[active.guard] >= -(bands[active.guard] if bands else 0.0)
@@ -56,17 +54,16 @@ class Commutation:
         options = [*_led(self._machines, new_modes, ACROSS), *_led(self._machines, new_modes, -THROUGH)]
         for new, led in self._keeping(after, state, new_modes, _sets(options, 0), names):
             if not any(self._machines[active.machine].is_one_way for _, active in exceeded(new, after, new)[1]):
-                return new, self._changes(t, modes, changed | led)
-        opens = {k: to for k, to in changed.items() if not self._machines[k].joins(to)}
+                return new, self._transitions(t, state, changed | led)
+        opens = {k: to for k, to in changed.items() if not self._machines[k].is_rigid(to)}
         if not 0 < len(opens) < len(changed):
             return None
         with suppress(NetworkError):  # then each by itself, which says what contradicts what
-            new, led = self.commutated(state, after, with_modes(modes, opens))
-            return new, self._changes(t, modes, opens | led)
+            return self.commutated(t, after, state, opens)
         return None
 
-    def _changes(self, t: float, modes: ModeNames, changed: Mapping[int, str]) -> list[Change]:
-        return [Change(t, self._machines[k], modes[k], name) for k, name in changed.items()]
+    def _transitions(self, t: float, state: HybridState, changed: Mapping[int, str]) -> list[Transition]:
+        return [Transition(t, self._machines[k], state.regime.modes[k], name) for k, name in changed.items()]
 
     def _keeping(
         self, t: float, state: HybridState, modes: ModeNames, sets: Iterable[dict[int, str]], names: Sequence[str]
@@ -96,9 +93,10 @@ def takeovers(machines: Sequence[ModeMachine], modes: ModeNames) -> Iterator[dic
     return _sets(_led(machines, modes, ACROSS), 1)
 
 
-def _sets(options: Sequence[tuple[int, str]], least: int) -> Iterator[dict[int, str]]:
+def _sets(options: Sequence[tuple[int, str]], least: int, most: int = 500) -> Iterator[dict[int, str]]:
+    """Sets of at least so many options, the smallest first, and at most so many of them: all of eight diodes."""
     sizes = range(least, len(options) + 1)
-    return islice(chain.from_iterable(map(dict, combinations(options, size)) for size in sizes), MOST)
+    return islice(chain.from_iterable(map(dict, combinations(options, size)) for size in sizes), most)
 
 
 def _led(machines: Sequence[ModeMachine], modes: ModeNames, when: Expr) -> list[tuple[int, str]]:

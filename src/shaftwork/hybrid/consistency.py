@@ -18,21 +18,15 @@ from collections.abc import Sequence
 from typing import Any
 
 from shaftwork.codegen.code import Moves
-from shaftwork.numerics.tolerances import EPS
+from shaftwork.numerics.tolerances import EPS, GOLDEN
 from shaftwork.pipeline.arguments import NOMINAL
 
 ROUNDINGS = 64.0
-"""The states are moved by so many rounding units to see how far rounding moves a guard."""
-FEW = 4
-"""What a guard gains ahead must be more than so many rounding units."""
+"""States and times are moved by so many rounding units to see how far rounding moves a guard, its band."""
 CLEAR = 8
 """A phase that starts at a limit or beyond meets it again where it is farther beyond by so many bands."""
 NOTHING = 1e-200
 """What is as good as zero, and is not."""
-AHEAD, AHEAD_OF_RUN = 1e-3, 1e-7
-"""How far ahead the further course is looked at: parts of the time in which a state moves by its nominal size, and of
-the run."""
-GOLDEN = (5**0.5 - 1) / 2
 
 Values = Any
 """A float, or an array whose last axis are lanes."""
@@ -57,7 +51,8 @@ def drift(gain: Values, beside: Values, band: Values) -> Values:
         band: how far rounding moves it.
     """
     size = abs(gain)
-    return ((size > abs(gain - beside)) & (size > FEW / ROUNDINGS * band)) * (2 * (gain > 0) - 1)
+    least = 4 / ROUNDINGS * band  # four rounding units: of these few operations no more is rounding
+    return ((size > abs(gain - beside)) & (size > least)) * (2 * (gain > 0) - 1)
 
 
 def clear_of_limit(excess: Values, band: Values) -> Values:
@@ -75,6 +70,15 @@ def clear_of_limit(excess: Values, band: Values) -> Values:
     return near * (excess * (excess > 0) + wide) + (1 - near) * (band / CLEAR) + NOTHING
 
 
+def time_scales(span: tuple[float, float]) -> tuple[float, float]:
+    """How far in s rounding moves the time of a run, and how far ahead the further course is looked at, at most.
+
+    Args:
+        span: start and end of the run, s.
+    """
+    return ROUNDINGS * math.ulp(max(map(abs, span))), 1e-7 * (span[1] - span[0])
+
+
 def rounding_moves(sizes: Sequence[float]) -> Moves:
     """Of each state a part of it and the least that rounding moves it, to both sides and not alike; the side; and how
     far a look ahead takes it.
@@ -84,7 +88,8 @@ def rounding_moves(sizes: Sequence[float]) -> Moves:
     """
     parts = [(-1) ** k * (0.5 + k * GOLDEN % 1) * ROUNDINGS * EPS for k in range(len(sizes))]
     pairs = zip(parts, sizes, strict=True)
-    return [(part, part * size / NOMINAL, math.copysign(1.0, part), AHEAD * size) for part, size in pairs]
+    # ahead a state moves by no more than a thousandth of its size, so that the course is straight there
+    return [(part, part * size / NOMINAL, math.copysign(1.0, part), 1e-3 * size) for part, size in pairs]
 
 
 def moved_by_rounding(x: Values, rate: Values, move: Values, tick: float, side: float = 1.0) -> Values:

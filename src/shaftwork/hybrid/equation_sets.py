@@ -27,7 +27,7 @@ class EquationSets:
     """All sets of equations of a network whose parts change their mode; each is made when a motion first needs it.
 
     Args:
-        base: the model in the first mode of each machine, in which no mode joins anything rigidly.
+        base: the model in the first mode of each machine, in which none of them is rigid.
         rebuild: makes the model of a changed netlist.
     """
 
@@ -101,7 +101,7 @@ class EquationSets:
         able = [k for k, machine in enumerate(self.machines) if machine.holds]
         if not able:
             return self.of(modes)
-        holding = tuple(k for k in able if self.machines[k].joins(modes[k]))
+        holding = tuple(k for k in able if self.machines[k].is_rigid(modes[k]))
         free = with_modes(modes, {k: self.first[k] for k in holding})
         forms = tuple(machine.modes[name].form for machine, name in zip(self.machines, free, strict=True))
         if forms not in self._slipping:
@@ -127,7 +127,7 @@ class EquationSets:
         if not slipping:
             return False
         x = np.random.default_rng(0).uniform(1.0, 2.0, len(equations.model.states))  # no two alike by chance
-        speeds = equations.across(slipping, 0.0, equations.joints(p).alike(x), p)
+        speeds = equations.across(slipping, 0.0, equations.joints(p).as_one(x), p)
         return any(abs(speed) < NO_IMPACT for speed in speeds)
 
     def _all_slipping(self, free: ModeNames) -> ReactionEquations | None:

@@ -14,7 +14,7 @@ from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.hybrid.commutation import Commutation
 from shaftwork.hybrid.equation_sets import EquationSets
 from shaftwork.hybrid.hybrid_state import (
-    Change,
+    EventOutcome,
     HybridState,
     Transition,
     differences,
@@ -26,10 +26,6 @@ from shaftwork.hybrid.hybrid_transfer import HybridTransfer, mode_anew, refuse_b
 from shaftwork.hybrid.impacts.impacts import Impacts
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import ActiveGuard, ModeNames, limited, with_modes
-
-MOST_AT_ONCE = 2000
-"""So many changes within one instant have no end: of two rigid flanks without a gap between them, say."""
-MOST_REPEATS = 2
 
 
 class EventIteration:
@@ -62,8 +58,8 @@ class EventIteration:
     def _commutation(self) -> Commutation:
         return Commutation(self.transfer)
 
-    def in_start_modes(self, t: float, x: Array, joins: Mapping[int, str] = MappingProxyType({})) -> HybridState:
-        """The modes in which a motion starts, from the states of the equations in which no mode joins anything.
+    def in_start_modes(self, t: float, x: Array, rigid: Mapping[int, str] = MappingProxyType({})) -> HybridState:
+        """The modes in which a motion starts, from the states of the equations in which no machine is rigid.
 
         A machine that nothing else lets start in its mode, as a friction that a prescribed speed is about to turn,
         starts in one to which that mode leads.
@@ -71,15 +67,15 @@ class EventIteration:
         Args:
             t: time in s at which inputs are read.
             x: (n,) states.
-            joins: machines that do join something in these equations, and the modes in which they do.
+            rigid: machines that are rigid in these equations all the same, and the modes in which they are.
 
         Raises:
             ParameterError: a twist lies beyond a rigid limit.
         """
-        loose = HybridState(self.transfer.regime(with_modes(self.transfer.first, joins)), x)
+        loose = HybridState(self.transfer.regime(with_modes(self.transfer.first, rigid)), x)
         refuse_beyond(loose, t)
         regime, modes = loose.regime, loose.regime.modes
-        wanted = with_modes(regime.equations.first_modes(t, x, regime.p), joins)
+        wanted = with_modes(regime.equations.first_modes(t, x, regime.p), rigid)
         if self.transfer.possible(wanted):
             return self.transfer.to_modes(loose, t, wanted)
         # of switches the time tells, so that others give way
@@ -94,8 +90,8 @@ class EventIteration:
         """The modes that go on where a motion starts at a time in s with states (n,), as in `in_start_modes`."""
         return self.run(t, t, self.in_start_modes(t, x), None)[0]
 
-    def run(self, t: float, after: float, state: HybridState, met: int | None) -> Transition:
-        """The modes that go on, and the changes that lead there.
+    def run(self, t: float, after: float, state: HybridState, met: int | None) -> EventOutcome:
+        """The hybrid state that goes on, and the transitions that lead there.
 
         Args:
             t: the instant, s.
@@ -104,55 +100,50 @@ class EventIteration:
             met: the guard that ended the phase, or None.
 
         Raises:
-            SimulationError: no modes are consistent; names the pair that changes for ever.
+            SimulationError: no modes are consistent; names the pair between which a machine changes for ever.
         """
         ends = met is not None or passes_limit(state._replace(bands=()), after)
-        joins = resting(state, after) if ends else {}
-        if not joins:
+        holding = resting(state, after) if ends else {}
+        if not holding:
             return self._fewest(t, after, state, met)
         # Who carries is told anew. A law that falls at once would tell a way in which nothing moves: of two frictions
         # one has given way at rest, and now the other one does, backward. Once it moves, the first one has less torque
         # than it holds at rest, and would move forward instead, which the other one does not let it.
-        joined, begun = self._joined(t, after, state, joins)
-        new, changes = self._consistent(t, after, joined, None)
-        if new.regime.modes == state.regime.modes:  # rounding hides what was met
-            ended = [(active.machine, active.leave) for active in state.regime.watched if active.guard == met]
-            same = (active.guard for active in joined.regime.watched if (active.machine, active.leave) in ended)
-            new, changes = self._fewest(t, after, joined, next(same, None))
-        return new, _together([*begun, *changes])
+        modes = state.regime.modes
+        stuck = self.transfer.to_modes(state, after, with_modes(modes, self.transfer.compatible(modes, holding)))
+        new, transitions = self._consistent(t, after, stuck, None)
+        if new.regime.modes == modes:  # rounding hides what was met
+            crossed = [(active.machine, active.leave) for active in state.regime.watched if active.guard == met]
+            same = (active.guard for active in stuck.regime.watched if (active.machine, active.leave) in crossed)
+            new, transitions = self._fewest(t, after, stuck, next(same, None))
+        return new, _together([*differences(t, self.machines, modes, stuck.regime.modes), *transitions])
 
-    def _joined(self, t: float, after: float, state: HybridState, joins: Mapping[int, str]) -> Transition:
-        """The same instant with machines in modes in which they hold, and the changes to these."""
-        modes, joinable = state.regime.modes, self.transfer.joinable(state.regime.modes, joins)
-        changes = [Change(t, self.machines[k], modes[k], name) for k, name in joinable.items()]
-        return self.transfer.to_modes(state, after, with_modes(modes, joinable)), changes
-
-    def _fewest(self, t: float, after: float, state: HybridState, met: int | None) -> Transition:
+    def _fewest(self, t: float, after: float, state: HybridState, met: int | None) -> EventOutcome:
         """Of several guards that are met at one instant, rounding tells which of them ends the phase.
 
-        So each is followed first, and the fewest changes are taken: two flanks that one torque has pressed together
+        So each is followed first, and the fewest transitions are taken: two flanks that one torque has pressed together
         part where they have to, and not at both.
         """
         if met is None:
             return self._consistent(t, after, state, None)
         named = next(active for active in state.regime.watched if active.guard == met)
-        transitions: list[Transition] = []
+        outcomes: list[EventOutcome] = []
         failed: list[SimulationError] = []
         met_at_once = self._at_once(state, after, named)
         # an angle waits for nothing
         least = max(1, len({active.machine for active in met_at_once if active.leave.by_twist}))
         for first in met_at_once:
             try:
-                transitions.append(self._consistent(t, after, state, first))
+                outcomes.append(self._consistent(t, after, state, first))
             except SimulationError as error:
                 failed.append(error)
             else:
-                changes = transitions[-1][1]
-                if len(changes) == 1 or (len(changes) == least and not any(one.impact for one in changes)):
+                transitions = outcomes[-1][1]
+                if len(transitions) == 1 or (len(transitions) == least and not any(one.impact for one in transitions)):
                     break  # none can be fewer
-        if not transitions:
+        if not outcomes:
             raise failed[0]
-        return min(transitions, key=lambda transition: len(transition[1]))
+        return min(outcomes, key=lambda outcome: len(outcome[1]))
 
     def _at_once(self, state: HybridState, t: float, named: ActiveGuard) -> list[ActiveGuard]:
         """The guards that are met at the instant at which one is, in the order of their machines."""
@@ -161,28 +152,39 @@ class EventIteration:
             met.append(named)
         return sorted(met, key=state.regime.watched.index)
 
-    def _consistent(self, t: float, after: float, state: HybridState, first: ActiveGuard | None) -> Transition:
-        """Modes that are consistent with the motion that follows, by one change after another; see `run`.
+    def _consistent(
+        self,
+        t: float,
+        after: float,
+        state: HybridState,
+        first: ActiveGuard | None,
+        most_transitions: int = 2000,
+        most_returns: int = 2,
+    ) -> EventOutcome:
+        """Modes that are consistent with the motion that follows, by one transition after another; see `run`.
 
         Args:
             t, after, state: as there.
             first: the guard to begin with, or None.
+            most_transitions: so many have no end: those of two rigid flanks without a gap between them, say.
+            most_returns: so often modes may come back. After the first time guards are taken in their order, which
+                nearly always ends.
         """
-        changes: list[Change] = []
+        transitions: list[Transition] = []
         idle: list[ActiveGuard] = []
         seen: dict[ModeNames, None] = {}
         blocked, repeats, late = None, 0, 0.0
         tried: Counter[tuple[ModeNames, int]] = Counter()  # other modes than what contradicts, each of them once
         # a guard is met where it is beyond zero by its band, which then still is the band of what is the same after it
-        ended = state
+        before = state
         worst = first
         if worst is None:
-            state, worst = _worst(state, after, ended, idle, repeats)
+            state, worst = _worst(state, after, before, idle, repeats)
         while worst is not None:
             here = state.regime.modes, worst.machine
             state, latest, contradiction, since = self._follow(t, after, state, worst, tried[here])
             late += since
-            changes, blocked = [*changes, *latest], contradiction or blocked
+            transitions, blocked = [*transitions, *latest], contradiction or blocked
             if contradiction is not None:
                 tried[here] += 1
                 if tried[here] > 1:
@@ -190,27 +192,27 @@ class EventIteration:
             impact = bool(latest) and latest[0].impact
             again = bool(latest) and not impact and state.regime.modes in seen
             repeats += again
-            if repeats > MOST_REPEATS or len(changes) > MOST_AT_ONCE:
-                raise _endless(t, changes, blocked)
+            if len(transitions) > most_transitions or repeats > most_returns:
+                raise _endless(t, transitions, blocked)
             if again or impact:
                 seen.clear()
             if impact:
                 tried.clear()  # what contradicted others need not do so at other speeds
             idle = [] if latest else [*idle, worst]
             seen[state.regime.modes] = None
-            state, worst = _worst(state, after, ended, idle, repeats)
+            state, worst = _worst(state, after, before, idle, repeats)
             if worst is None and late:  # in the modes that go on, how long ago it was hit
-                state, worst = _worst(state.moved(after, late), after, ended, idle, repeats)
+                state, worst = _worst(state.moved(after, late), after, before, idle, repeats)
                 late = 0.0
-        return state, changes
+        return state, transitions
 
     def _follow(
-        self, t: float, after: float, state: HybridState, ended: ActiveGuard, tried: int
-    ) -> tuple[HybridState, list[Change], NetworkError | None, float]:
+        self, t: float, after: float, state: HybridState, crossed: ActiveGuard, tried: int
+    ) -> tuple[HybridState, list[Transition], NetworkError | None, float]:
         """The mode of a machine changes, or what hits is thrown back; what kept it from what it wanted, and how long
         ago, in s, it was hit. Of the other modes instead of what contradicts, some have been tried.
         """
-        number, leave, regime = ended.machine, ended.leave, state.regime
+        number, leave, regime = crossed.machine, crossed.leave, state.regime
         machine = self.machines[number]
         before = regime.modes[number]
         to = leave.to or mode_anew(state, after, number)
@@ -224,18 +226,15 @@ class EventIteration:
             to, speed = slips, 0.0
         try:
             if speed or (leave.rebound is not None and not slips):
-                hit = self.impacts.hit(t, after, state, replace(ended, leave=replace(leave, to=to)))
+                hit = self.impacts.hit(t, after, state, replace(crossed, leave=replace(leave, to=to)))
                 return *hit[:2], None, hit[2]
-            modes = with_modes(regime.modes, {number: to})
-            new, conducting = self._commutation.commutated(state, after, modes)
-            others = [Change(t, self.machines[k], regime.modes[k], name) for k, name in conducting.items()]
-            return new, [Change(t, machine, before, to), *others], None, 0.0
+            return *self._commutation.commutated(t, after, state, {number: to}), None, 0.0
         except NetworkError as error:
             return *self._instead(t, after, state, (number, to), error, tried), error, 0.0
 
     def _instead(
         self, t: float, after: float, state: HybridState, wanted: tuple[int, str], error: NetworkError, tried: int
-    ) -> Transition:
+    ) -> EventOutcome:
         """Past a mode whose equations contradict others: into one to which it leads, or something else gives way.
 
         A friction that a prescribed speed turns cannot stick: it passes from slipping one way to slipping the other.
@@ -244,7 +243,7 @@ class EventIteration:
         machine, before = self.machines[number], modes[number]
         gears = self.impacts.gears
         if number in gears and (other := self._passing_on(after, state, number, to)) is not None:
-            return other[0], [Change(t, machine, before, other[1])]
+            return other[0], [Transition(t, machine, before, other[1])]
         leads = (leave for leave in machine.modes[to].leaves if leave.to not in ("", before))
         # neither the other flank nor a time to come is there
         leads_on = [{number: leave.to} for leave in leads if leave.rebound is None and not leave.by_twist]
@@ -284,28 +283,28 @@ class EventIteration:
 
 
 def _worst(
-    state: HybridState, t: float, ended: HybridState, idle: Sequence[ActiveGuard], repeats: int
+    state: HybridState, t: float, before: HybridState, idle: Sequence[ActiveGuard], repeats: int
 ) -> tuple[HybridState, ActiveGuard | None]:
     """The guard that is farthest beyond its limit, or on it and about to go beyond; the hybrid state with its bands.
 
     Args:
-        state, t, ended, idle: as in `exceeded`.
+        state, t, before, idle: as in `exceeded`.
         repeats: how often modes have come back. After the first time the first guard is taken. The worst leads faster
             to modes that are consistent, as a rule; but this always does where parts hold each other (Murty, Linear
             Complementarity, 1988, section 4.1).
     """
     in_order = repeats > 0
-    state, excesses = exceeded(state, t, ended, idle, in_order=in_order, again=in_order)
+    state, excesses = exceeded(state, t, before, idle, in_order=in_order, again=in_order)
     if not excesses:
         return state, None
     first = min(excesses, key=lambda one: one[1].machine) if in_order else max(excesses, key=lambda one: one[0])
     return state, first[1]
 
 
-def _endless(t: float, changes: list[Change], blocked: NetworkError | None) -> SimulationError:
-    """The error of changes within one instant that come to no end, or of what contradicts what among them."""
-    last = changes[-1]
-    others = dict.fromkeys(change.machine.name for change in changes)
+def _endless(t: float, transitions: list[Transition], blocked: NetworkError | None) -> SimulationError:
+    """The error of transitions within one instant that come to no end, or of what contradicts what among them."""
+    last = transitions[-1]
+    others = dict.fromkeys(transition.machine.name for transition in transitions)
     before, after = (last.machine.modes[name].words for name in (last.before, last.after))
     if blocked is not None:
         advice = str(blocked.problems[0])
@@ -319,12 +318,12 @@ def _endless(t: float, changes: list[Change], blocked: NetworkError | None) -> S
     )
 
 
-def _together(changes: list[Change]) -> list[Change]:
-    """Changes of one instant, with those of each machine in one; but an impact stays apart."""
-    if any(change.impact for change in changes):
-        return changes
-    by_machine: dict[int, Change] = {}
-    for change in changes:
-        earlier = by_machine.get(id(change.machine), change)
-        by_machine[id(change.machine)] = change._replace(before=earlier.before)
-    return [change for change in by_machine.values() if change.before != change.after]
+def _together(transitions: list[Transition]) -> list[Transition]:
+    """The transitions of one instant, with those of each machine in one; but an impact stays apart."""
+    if any(transition.impact for transition in transitions):
+        return transitions
+    by_machine: dict[int, Transition] = {}
+    for transition in transitions:
+        earlier = by_machine.get(id(transition.machine), transition)
+        by_machine[id(transition.machine)] = transition._replace(before=earlier.before)
+    return [transition for transition in by_machine.values() if transition.before != transition.after]

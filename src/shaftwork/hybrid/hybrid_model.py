@@ -35,8 +35,6 @@ from shaftwork.results.solution import Solution
 
 MOST_CHANGES = 100
 """Changes of mode on the way to a steady operation."""
-LEFT = 1e-3
-"""What is left of a disturbance in a torque is more than this fraction where it stays: rounding leaves some 1e-4."""
 
 
 class PhaseModel(CompiledModel):
@@ -159,8 +157,8 @@ class HybridModel(Model):
             ends = partial(_ends, state, when)
             x = steady_state(bound, state.x, when, ends=ends) if state.x.size else state.x
             beyond = ends(x)
-            state, changes = event_iteration.run(when, when, state._replace(x=x), None)
-            if not (changes or beyond):
+            state, transitions = event_iteration.run(when, when, state._replace(x=x), None)
+            if not (transitions or beyond):
                 if not math.isfinite(t):
                     warn_of_earlier_levels(bound, state.x, when, state.regime.model.switching)
                 warn_of_held_torques(state, when)
@@ -208,7 +206,7 @@ def _ends(state: HybridState, t: float, x: Array) -> bool:
     return passes_limit(state._replace(x=x), t)
 
 
-def warn_of_held_torques(state: HybridState, when: float) -> None:
+def warn_of_held_torques(state: HybridState, when: float, left: float = 1e-3) -> None:
     """Warn where what sticks can hold other torques as well: a spring between two of them, or from one to the frame.
 
     The states are disturbed, and of that is read what is left for ever: it tells equilibria side by side.
@@ -216,6 +214,7 @@ def warn_of_held_torques(state: HybridState, when: float) -> None:
     Args:
         state: the steady state.
         when: time at which laws are read, s.
+        left: part of a disturbance that is left in a torque where it stays; rounding leaves some 1e-4 of it.
     """
     regime, x = state.regime, state.x
     holding = [
@@ -228,9 +227,11 @@ def warn_of_held_torques(state: HybridState, when: float) -> None:
     bound = regime.bound
     shares = np.random.default_rng(0).uniform(1.0, 2.0, x.size)  # no state makes up for another
     disturbed = shares / energy_weights(bound)
-    left = lasting(bound, x, disturbed, when)
-    now, soon, late = (np.array(regime.limits(when, (x + change).tolist())) for change in (0 * x, disturbed, left))
-    moves = np.abs(late - now) > LEFT * np.abs(soon - now).max()
+    remaining = lasting(bound, x, disturbed, when)
+    now, soon, late = (
+        np.array(regime.guards_at(when, (x + change).tolist())) for change in (0 * x, disturbed, remaining)
+    )
+    moves = np.abs(late - now) > left * np.abs(soon - now).max()
     if names := tuple(dict.fromkeys(name for name, guard in holding if moves[guard])):
         network = bound.program.form.graph.name
         warn(

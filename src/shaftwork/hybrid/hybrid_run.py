@@ -25,7 +25,7 @@ from shaftwork.core.notices import warn
 from shaftwork.hybrid.commutation import takeovers
 from shaftwork.hybrid.equation_sets import EquationSets
 from shaftwork.hybrid.event_iteration import EventIteration
-from shaftwork.hybrid.hybrid_state import Change, HybridState, Regime, Transition
+from shaftwork.hybrid.hybrid_state import EventOutcome, HybridState, Regime, Transition
 from shaftwork.hybrid.in_place_events import InPlaceEvents, Phase
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, with_modes
@@ -41,14 +41,13 @@ if TYPE_CHECKING:
     from shaftwork.waves.hybrid_waves import WaveRun
 
 CHATTER = ((200, 1e-9), (3000, 1e-6))
-"""So many changes of mode, each within this part of the run of the one before, are chatter. Rebounds come ever faster,
+"""So many transitions, each within this part of the run of the one before, are chatter. Rebounds come ever faster,
 too, before they end: a thousand of them where nearly all speed is given back."""
 SELDOM = max(part for _, part in CHATTER)
-TIGHTEST_RTOL = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
-class Span:
+class Segment:
     """One run of an engine: phases in the same equations.
 
     Args:
@@ -67,12 +66,12 @@ class SharedByRuns:
     Args:
         event_iteration: changes modes.
         timelines: by equations, the instants at which inputs jump or bend.
-        begins: modes and states with which a motion from rest begins, and the changes that lead there.
+        begins: modes and states with which a motion from rest begins, and the transitions that lead there.
     """
 
     event_iteration: EventIteration
     timelines: dict[ModeEquations, Timeline] = field(default_factory=dict)
-    begins: list[Transition] = field(default_factory=list)
+    begins: list[EventOutcome] = field(default_factory=list)
 
 
 class HybridRun:
@@ -95,8 +94,8 @@ class HybridRun:
             key, lambda: SharedByRuns(EventIteration(equation_sets, values, demand.span, equations))
         )
         self.event_iteration: EventIteration = self._shared.event_iteration
-        self.spans: list[Span] = []
-        self.changes: list[Change] = []
+        self.segments: list[Segment] = []
+        self.transitions: list[Transition] = []
         self.jumps: list[Impact] = []
         self.engine, self.why, self.steps = "", "", 0
         self.waves: WaveRun | None = None
@@ -104,11 +103,11 @@ class HybridRun:
         self._duration = demand.span[1] - demand.span[0]
 
     def march(self, initial: Mapping[str, float] | None) -> None:
-        """Go through all phases from the start values, from one change of equations to the next."""
+        """Go through all phases from the start values, from one set of equations to the next."""
         t, end = self.demand.span
         state = self.begin(initial)
         while t < end:
-            t, state = self._span(t, state)
+            t, state = self._segment(t, state)
 
     def begin(self, initial: Mapping[str, float] | None) -> HybridState:
         """The states and modes at the start."""
@@ -116,42 +115,42 @@ class HybridRun:
         if self.event_iteration.transfer.regime(self.equation_sets.first).equations.model.form.waves:
             begins = []  # what leaves the ends before the start is of the run
         if isinstance(initial, Ending):
-            state, changes = self._resumed(initial)
+            state, transitions = self._resumed(initial)
         elif initial is None and begins:
-            state, changes = begins[0]
+            state, transitions = begins[0]
         else:
-            state, changes = self._started(initial)
+            state, transitions = self._started(initial)
             if initial is None:
-                begins.append((state, changes))
+                begins.append((state, transitions))
         if initial and start != 0 and not isinstance(initial, Ending):
             for machine, mode in zip(self.equation_sets.machines, state.regime.modes, strict=True):
                 warn_of_what_may_have_begun(machine.name, machine.modes, mode, start)
-        self.note(start, changes)
+        self.note(start, transitions)
         return state
 
-    def _started(self, initial: Mapping[str, float] | None) -> Transition:
-        """The states and modes at the start, and what changes there; currents may need diodes that conduct."""
+    def _started(self, initial: Mapping[str, float] | None) -> EventOutcome:
+        """The states and modes at the start, and the transitions there; currents may need diodes that conduct."""
         if not initial:
-            return self._joined({}, self._read(initial, {}))
+            return self._going_on({}, self._read(initial, {}))
         readings, failed = list[tuple[int, dict[int, str], HybridState]](), None
         start, closed = self.demand.span[0], self._closed()
-        for joins in [{}, closed] if closed else [{}]:
+        for rigid in [{}, closed] if closed else [{}]:
             try:
-                state = self._read(initial, joins)
+                state = self._read(initial, rigid)
             except ParameterError as error:
                 failed = failed or error
             else:
                 stored = state.stored(start)
-                readings.append((sum(stored[name] != 0 for name in stored.keys() - initial.keys()), joins, state))
+                readings.append((sum(stored[name] != 0 for name in stored.keys() - initial.keys()), rigid, state))
         if readings:  # what is not named rests, if the circuit lets it
-            _, joins, state = min(readings, key=itemgetter(0))
-            return self._joined(joins, state)
-        for joins in takeovers(self.equation_sets.machines, with_modes(self.equation_sets.first, closed)):
+            _, rigid, state = min(readings, key=itemgetter(0))
+            return self._going_on(rigid, state)
+        for rigid in takeovers(self.equation_sets.machines, with_modes(self.equation_sets.first, closed)):
             with suppress(ParameterError, SimulationError, NetworkError):
-                transition = self._joined(closed | joins, self._read(initial, closed | joins))
-                stored = transition[0].stored(start)
+                outcome = self._going_on(closed | rigid, self._read(initial, closed | rigid))
+                stored = outcome[0].stored(start)
                 if all(abs(stored.get(k, v) - v) <= NO_IMPACT * max(abs(v), 1.0) for k, v in initial.items()):
-                    return transition
+                    return outcome
         assert failed is not None  # noqa: S101 (as no reading is left)
         raise failed
 
@@ -162,32 +161,24 @@ class HybridRun:
             return {}
         regime = self.event_iteration.transfer.regime(self.equation_sets.first)
         rest = np.zeros(len(regime.model.states))
-        modes = regime.equations.first_modes(self._after(regime), rest, regime.p)
-        joins = {k: modes[k] for k in switches if modes[k] != self.equation_sets.first[k]}
-        return joins if self.event_iteration.transfer.possible(with_modes(self.equation_sets.first, joins)) else {}
+        modes = regime.equations.first_modes(self.timeline(regime).sides(self.demand.span[0])[1], rest, regime.p)
+        rigid = {k: modes[k] for k in switches if modes[k] != self.equation_sets.first[k]}
+        return rigid if self.event_iteration.transfer.possible(with_modes(self.equation_sets.first, rigid)) else {}
 
-    def _read(self, initial: Mapping[str, float] | None, joins: Mapping[int, str]) -> HybridState:
-        """Start values in the equations in which some machines join something."""
-        start, regime = (
-            self.demand.span[0],
-            self.event_iteration.transfer.regime(with_modes(self.equation_sets.first, joins)),
-        )
-        equations = regime.equations
+    def _read(self, initial: Mapping[str, float] | None, rigid: Mapping[int, str]) -> HybridState:
+        """Start values in the equations in which some machines are rigid."""
+        regime = self.event_iteration.transfer.regime(with_modes(self.equation_sets.first, rigid))
+        start, equations = self.demand.span[0], regime.equations
         if isinstance(initial, Mapping) and initial and start != 0:
             refuse_incomplete(equations.stores.names, initial, start)
         x, waves = equations.model.start(equations.prepared(regime.p), initial, self.demand.span)
         return HybridState(regime, self._beside_waves(regime, x, waves))
 
-    def _after(self, regime: Regime) -> float:
-        """A time just after the start."""
-        return self.timeline(regime.equations, regime.p).sides(self.demand.span[0])[1]
-
-    def _joined(self, joins: Mapping[int, str], read: HybridState) -> Transition:
-        """The modes that go on from a start that has been read where some machines join something, and the changes."""
-        after = self._after(read.regime)
-        return self.event_iteration.run(
-            self.demand.span[0], after, self.event_iteration.in_start_modes(after, read.x, joins), None
-        )
+    def _going_on(self, rigid: Mapping[int, str], read: HybridState) -> EventOutcome:
+        """The modes that go on from a start that has been read where some machines are rigid, and the transitions."""
+        start = self.demand.span[0]
+        after = self.timeline(read.regime).sides(start)[1]
+        return self.event_iteration.run(start, after, self.event_iteration.in_start_modes(after, read.x, rigid), None)
 
     def _beside_waves(self, regime: Regime, x: Array, start: Any) -> Array:
         """The states at the start, and behind them what arrives by waves, if there are any."""
@@ -198,19 +189,17 @@ class HybridRun:
         self.waves = WaveRun(regime.bound, start, self.demand.span)
         return np.concatenate([x, self.waves.arriving(self.demand.span[0])])
 
-    def _resumed(self, ending: Ending) -> Transition:
-        """The states and modes in which another motion ended, and what changes at that instant."""
+    def _resumed(self, ending: Ending) -> EventOutcome:
+        """The states and modes in which another motion ended, and the transitions at that instant."""
         start, first = self.demand.span[0], self.event_iteration.transfer.regime(self.equation_sets.first)
         x = self._beside_waves(first, np.zeros(len(first.model.states)), ending.waves)
-        state, changes = (
-            self.event_iteration.transfer.resumed(ending.beside(first.equations.arriving(x))),
-            list[Change](),
-        )
-        after = self._instants(state).sides(start)[1]
+        state = self.event_iteration.transfer.resumed(ending.beside(first.equations.arriving(x)))
+        transitions = list[Transition]()
+        after = self.timeline(state.regime).sides(start)[1]
         if after != ending.read and state.regime.form.has_impulses:
-            state, changes, _ = self.event_iteration.impacts.jumped(start, state, ending.read, after)
+            state, transitions, _ = self.event_iteration.impacts.jumped(start, state, ending.read, after)
         state, further = self.event_iteration.run(start, after, state, None)
-        return state, [*changes, *further]
+        return state, [*transitions, *further]
 
     def choose(self) -> tuple[str, str]:
         """The engine for the first phase, and why."""
@@ -227,33 +216,30 @@ class HybridRun:
         """Whether heyoka goes on from a time on: it is what was asked for, or suits the modes."""
         return self.demand.engine != "auto" or self._engine(state, lambda: self._problem(t, state))[0] == "heyoka"
 
-    def timeline(self, equations: ModeEquations, p: Array) -> Timeline:
+    def timeline(self, regime: Regime) -> Timeline:
         """The instants at which inputs jump or bend."""
-        timelines = self._shared.timelines
-        if equations.whole not in timelines:
-            timelines[equations.whole] = equations.model.switching.timeline(p, *self.demand.span)
-        return timelines[equations.whole]
+        timelines, equations = self._shared.timelines, regime.equations.whole
+        if equations not in timelines:
+            timelines[equations] = regime.model.switching.timeline(regime.p, *self.demand.span)
+        return timelines[equations]
 
-    def _instants(self, state: HybridState) -> Timeline:
-        return self.timeline(state.regime.equations, state.regime.p)
-
-    def note(self, t: float, changes: list[Change]) -> None:
-        """Put down what has changed at a time.
+    def note(self, t: float, transitions: list[Transition]) -> None:
+        """Put down the transitions at a time.
 
         Raises:
-            SimulationError: changes follow each other without time going on.
+            SimulationError: transitions follow each other without time going on.
         """
-        if not changes:
+        if not transitions:
             return
-        passed = (t - self.changes[-1].time) / self._duration if self.changes else 1.0
-        self.changes += changes
+        passed = (t - self.transitions[-1].time) / self._duration if self.transitions else 1.0
+        self.transitions += transitions
         if passed >= SELDOM:
             self._soon = [0] * len(CHATTER)
             return
         for number, (most, part) in enumerate(CHATTER):
             self._soon[number] = self._soon[number] + 1 if passed < part else 0
             if self._soon[number] > most:
-                last = changes[-1]
+                last = transitions[-1]
                 raise SimulationError(
                     f"{type(last.machine.part.component).__name__} '{last.machine.name}' changes again and again "
                     f"between '{last.before}' and '{last.after}' at t = {t:.9g} s, {most} times with hardly any time "
@@ -262,7 +248,7 @@ class HybridRun:
 
     def _problem(self, t: float, state: HybridState, in_place: InPlaceEvents | None = None) -> Problem:
         """The motion from a time on, up to the next instant at which an input jumps."""
-        demand, regime, times = self.demand, state.regime, self._instants(state)
+        demand, regime, times = self.demand, state.regime, self.timeline(state.regime)
         following = bisect_right(times.stops, t)
         end = min([*times.stops[following : following + 1], demand.span[1]])
         problem = state.problem((t, end), times)
@@ -277,12 +263,12 @@ class HybridRun:
             t_eval=self._outputs(t, end),
             max_steps=demand.max_steps - self.steps,
             earlier_steps=self.steps,
-            react=in_place,
+            past_guards=in_place,
             progress=demand.progress,
         )
 
-    def _span(self, t: float, state: HybridState) -> tuple[float, HybridState]:
-        """One run of the engine, up to other equations or an instant at which an input jumps; what goes on then."""
+    def _segment(self, t: float, state: HybridState) -> tuple[float, HybridState]:
+        """One run of an engine, up to other equations or an instant at which an input jumps; what goes on then."""
         regime, form = state.regime, state.regime.form
         bind = partial(regime.equations.bound, regime.p)
         if form.doubtful:
@@ -297,27 +283,27 @@ class HybridRun:
         if self.demand.t_eval is not None and t in trajectory.t[-1:] and t < self.demand.span[1]:
             # an output at an event belongs to the next phase, which has it too
             trajectory = replace(trajectory, t=trajectory.t[:-1], x=trajectory.x[:-1])
-        self.spans.append(Span(trajectory, tuple(in_place.phases)))
+        self.segments.append(Segment(trajectory, tuple(in_place.phases)))
         return t, self._next_state(t, x[: state.x.size], in_place, trajectory.met)
 
     def _next_state(self, t: float, x: Array, in_place: InPlaceEvents, met: int | None) -> HybridState:
         """What goes on at the end of a run of the engine, from its states (n,) and the guard that is met, or None."""
         state = HybridState(in_place.regime, x, in_place.bands)
-        sides = self._instants(state).sides(t)
+        sides = self.timeline(state.regime).sides(t)
         if met is not None and in_place.beyond is not None and sides == (t, t):
-            state, changes = in_place.beyond
-            self.note(t, changes)
+            state, transitions = in_place.beyond
+            self.note(t, transitions)
             return state
         if sides != (t, t) and state.regime.form.has_impulses:
-            state, changes, at_once = self.event_iteration.impacts.jumped(t, state, *sides)
-            self.note(t, changes)
+            state, transitions, at_once = self.event_iteration.impacts.jumped(t, state, *sides)
+            self.note(t, transitions)
             self.jumps.append(at_once)
-            met = None if changes else met
+            met = None if transitions else met
         if met is None and t >= self.demand.span[1]:
             return state
-        after = self._instants(state).sides(t)[1]  # those of other equations, where a jump has led there
-        state, changes = self.event_iteration.run(t, after, state, met)
-        self.note(t, changes)
+        after = self.timeline(state.regime).sides(t)[1]  # those of other equations, where a jump has led there
+        state, transitions = self.event_iteration.run(t, after, state, met)
+        self.note(t, transitions)
         return state
 
     def _outputs(self, t: float, end: float) -> Array | None:
@@ -330,22 +316,22 @@ class HybridRun:
     def _followed(self, t: float, state: HybridState) -> tuple[Trajectory, InPlaceEvents]:
         """One run of the engine; where heyoka cannot go on, or a stiff phase is long, another engine begins it anew."""
         in_place = InPlaceEvents(self.event_iteration, state, t, self.note, self._suits_heyoka)
-        problem, noted, soon = self._problem(t, state, in_place), len(self.changes), [*self._soon]
+        problem, noted, soon = self._problem(t, state, in_place), len(self.transitions), [*self._soon]
         if not problem.x0.size:
             still = without_states(problem, state.regime.model.degree)
             return replace(still, end=(problem.t_end, problem.x0)), in_place
         name, why = self._engine(state, lambda: problem)
         if self.waves is not None:
-            return self._solve(problem, name, why, self.waves.solver(state.regime)), in_place
+            return self._solve(problem, name, why, partial(self.waves.solve, state.regime)), in_place
         stiff, most = name != "heyoka", problem.max_steps
         if self.demand.engine != "auto" or (stiff and not self.equation_sets.tries_heyoka(state.regime.equations)):
             return self._solve(problem, name, why), in_place
 
         def anew(engine: str, steps: int, because: str) -> tuple[Trajectory, InPlaceEvents]:
-            del self.changes[noted:]
+            del self.transitions[noted:]
             self._soon = [*soon]
             events = InPlaceEvents(self.event_iteration, state, t, self.note)
-            return self._solve(changed(problem, react=events, max_steps=steps), engine, because), events
+            return self._solve(changed(problem, past_guards=events, max_steps=steps), engine, because), events
 
         steps = min(most, choice.patience(problem)) if stiff else most
         try:
@@ -364,7 +350,8 @@ class HybridRun:
         entry = ENGINES[name]
         assert entry.following is not None  # noqa: S101 (`EquationSets.engine` refuses others)
         share, loosest = entry.following
-        tight = max(min(share * problem.rtol, loosest), min(problem.rtol, TIGHTEST_RTOL))
+        # nearer to rounding than this no engine gets more exact
+        tight = max(min(share * problem.rtol, loosest), min(problem.rtol, 1e-14))
         if tight != problem.rtol:
             problem = changed(problem, rtol=tight, atol=problem.atol * (tight / problem.rtol))
         trajectory = choice.solve(problem, name, why)[0] if solver is None else solver(problem)

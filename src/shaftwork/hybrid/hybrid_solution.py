@@ -15,8 +15,8 @@ from shaftwork.codegen.array_form.elements import Array, Index
 from shaftwork.codegen.model_observer import DenseWaves, Impact, ModelObserver
 from shaftwork.codegen.timeline import Timeline
 from shaftwork.components.base import Component
-from shaftwork.hybrid.hybrid_run import HybridRun, Span
-from shaftwork.hybrid.hybrid_state import Change, Regime
+from shaftwork.hybrid.hybrid_run import HybridRun, Segment
+from shaftwork.hybrid.hybrid_state import Regime, Transition
 from shaftwork.hybrid.impacts.impulses import summed
 from shaftwork.hybrid.modes.mode_machines import ModeMachine
 from shaftwork.results.observer import PhaseRow
@@ -28,35 +28,35 @@ if TYPE_CHECKING:
 
 def solution(run: HybridRun, name: str) -> Solution:
     """The motion as a whole, to be read."""
-    whole = Stretches(run) if run.waves is None else _WithWaves(run, run.waves)
+    whole = DenseMotion(run) if run.waves is None else _WithWaves(run, run.waves)
     return Solution(
         name=name,
-        t=np.concatenate([span.trajectory.t for span in run.spans]),
+        t=np.concatenate([segment.trajectory.t for segment in run.segments]),
         x=np.concatenate([*_outputs(run, whole)]),
         states=whole.names,
         engine=run.engine,
         why=run.why,
-        statistics={"steps": run.steps, "changes": len(run.changes)},
+        statistics={"steps": run.steps, "changes": len(run.transitions)},
         dense=whole,
         observer=PhaseObserver(run, whole),
-        events=tuple(_events(run.changes)),
+        events=tuple(_events(run.transitions)),
         phases=_table(run),
     )
 
 
 @dataclass(eq=False)
-class Stretch:
+class DensePhase:
     """A phase as it is read.
 
     Args:
         regime: its modes and equations.
         instants: at which inputs jump.
-        span: the run of an engine in which it is.
+        segment: the run of an engine in which it is.
     """
 
     regime: Regime
     instants: Timeline
-    span: Span
+    segment: Segment
 
     @cached_property
     def observer(self) -> ModelObserver:
@@ -76,7 +76,7 @@ class Stretch:
         return np.hstack([stored, waves]) if waves.size else stored
 
 
-class Stretches:
+class DenseMotion:
     """All phases of a motion, by time, and all that is stored at any time; each is made when it is first read.
 
     Args:
@@ -84,30 +84,30 @@ class Stretches:
     """
 
     def __init__(self, run: HybridRun) -> None:
-        self._run, self._stretches = run, dict[int, Stretch]()
-        self._pairs = [(span, phase) for span in run.spans for phase in span.phases]
+        self._run, self._dense = run, dict[int, DensePhase]()
+        self._pairs = [(segment, phase) for segment in run.segments for phase in segment.phases]
         self._starts = np.array([phase.start for _, phase in self._pairs])
         self.names = self._pairs[0][1].regime.stores.names
         """Of all that is stored."""
 
-    def __getitem__(self, number: int) -> Stretch:
-        if number not in self._stretches:
-            span, (_, regime) = self._pairs[number]
-            instants = self._run.timeline(regime.equations, regime.p)
-            self._stretches[number] = Stretch(regime, instants, span)
-        return self._stretches[number]
+    def __getitem__(self, number: int) -> DensePhase:
+        if number not in self._dense:
+            segment, (_, regime) = self._pairs[number]
+            instants = self._run.timeline(regime)
+            self._dense[number] = DensePhase(regime, instants, segment)
+        return self._dense[number]
 
     @property
     def steps(self) -> Array:
         """Ends of the integration steps."""
-        return np.unique(np.concatenate([span.trajectory.steps for span in self._run.spans]))
+        return np.unique(np.concatenate([segment.trajectory.steps for segment in self._run.segments]))
 
     def numbers(self, t: Array) -> Index:
         """The numbers of the phases at times (k,), of a time between two that of the later one."""
         numbers: Index = np.clip(np.searchsorted(self._starts, t, side="right") - 1, 0, None)
         return numbers
 
-    def groups(self, t: Array) -> Iterator[tuple[Stretch, Index]]:
+    def groups(self, t: Array) -> Iterator[tuple[DensePhase, Index]]:
         """Of phases in equal modes the first, and the places of the times (k,) in all of them.
 
         A time between two phases belongs to the later one; of one that is listed twice in a row the first does not.
@@ -127,11 +127,11 @@ class Stretches:
         numbers = self.numbers(t)
         for number in np.unique(numbers).tolist():
             places = np.flatnonzero(numbers == number)
-            stored[places] = self[number].stored(t[places], self[number].span.trajectory.dense(t[places]))
+            stored[places] = self[number].stored(t[places], self[number].segment.trajectory.dense(t[places]))
         return stored
 
 
-class _WithWaves(Stretches):
+class _WithWaves(DenseMotion):
     """The same beside travelling waves, which are a motion between the phases too.
 
     Args:
@@ -144,15 +144,15 @@ class _WithWaves(Stretches):
         self.held, self.leaving, self.carried = waves.held, waves.leaving, waves.carried
 
 
-def _outputs(run: HybridRun, stretches: Stretches) -> Iterator[Array]:
-    """(k, stores) of each span: all that is stored at its output times, and what arrives by waves."""
+def _outputs(run: HybridRun, dense: DenseMotion) -> Iterator[Array]:
+    """(k, stores) of each segment: all that is stored at its output times, and what arrives by waves."""
     first = 0
-    for span in run.spans:
-        t, x, phases = span.trajectory.t, span.trajectory.x, len(span.phases)
-        numbers = np.clip(stretches.numbers(t), first, first + phases - 1)
-        if span.phases[0].regime.stores.by_loops:  # then they follow alike in all of its phases
+    for segment in run.segments:
+        t, x, phases = segment.trajectory.t, segment.trajectory.x, len(segment.phases)
+        numbers = np.clip(dense.numbers(t), first, first + phases - 1)
+        if segment.phases[0].regime.stores.by_loops:  # then they follow alike in all of its phases
             numbers[:] = first
-        stored = [stretches[k].stored(t[numbers == k], x[numbers == k]) for k in np.unique(numbers).tolist()]
+        stored = [dense[k].stored(t[numbers == k], x[numbers == k]) for k in np.unique(numbers).tolist()]
         first += phases
         yield from stored  # times do not fall, and so numbers do not
 
@@ -162,11 +162,11 @@ class PhaseObserver:
 
     Args:
         run: the motion.
-        stretches: its phases.
+        dense: its phases.
     """
 
-    def __init__(self, run: HybridRun, stretches: Stretches) -> None:
-        self._run, self._stretches, self._names = run, stretches, stretches.names
+    def __init__(self, run: HybridRun, dense: DenseMotion) -> None:
+        self._run, self._dense, self._names = run, dense, dense.names
         self._last: tuple[Array, Array, tuple[tuple[ModelObserver, Index, Array, Array], ...]] | None = None
 
     def impacts(self, _dense: DenseWaves) -> tuple[Impact, ...]:
@@ -175,7 +175,7 @@ class PhaseObserver:
 
     @property
     def _first(self) -> ModelObserver:
-        return self._stretches[0].observer
+        return self._dense[0].observer
 
     @property
     def units(self) -> Mapping[str, str]:
@@ -239,8 +239,8 @@ class PhaseObserver:
         regime = self._at(t).regime
         return {machine.name: name for machine, name in zip(regime.machines, regime.modes, strict=True)}
 
-    def _at(self, t: float) -> Stretch:
-        return self._stretches[int(self._stretches.numbers(np.array([t]))[0])]
+    def _at(self, t: float) -> DensePhase:
+        return self._dense[int(self._dense.numbers(np.array([t]))[0])]
 
     def part(self, name: str) -> Component:
         """A component of the network, with the parameter values of this motion."""
@@ -259,7 +259,7 @@ class PhaseObserver:
 
     def _cut(self, t: Array, x: Array) -> Iterator[tuple[ModelObserver, Index, Array, Array]]:
         names = self._names
-        for first, places in self._stretches.groups(t):
+        for first, places in self._dense.groups(t):
             columns = [*map(names.index, first.regime.model.states), *range(len(names), x.shape[1])]
             yield first.observer, places, self._sided(first.instants, t, places), x[places][:, columns]
 
@@ -280,12 +280,12 @@ def _fill(totals: dict[str, Array], values_of: Mapping[str, Array], places: Inde
 
 
 def _impacts(run: HybridRun) -> tuple[Impact, ...]:
-    """Changes and sources with which speeds may jump, those of one time in one, with the part that hits or changes."""
+    """Where speeds may jump: transitions and sources, those of one time in one, with the part that hits or changes."""
     jumps = [jump for jump in run.jumps if jump.given or jump.lost]
-    for change in sorted(run.changes, key=lambda change: (change.time, not change.impact)):
-        modes = change.machine.modes
-        if change.rebound or change.given or change.lost or modes[change.before].form != modes[change.after].form:
-            jumps.append(Impact(change.time, change.machine.part.name, change.given, change.lost))
+    for one in sorted(run.transitions, key=lambda transition: (transition.time, not transition.impact)):
+        modes = one.machine.modes
+        if one.rebound or one.given or one.lost or modes[one.before].form != modes[one.after].form:
+            jumps.append(Impact(one.time, one.machine.part.name, one.given, one.lost))
     by_time: dict[float, Impact] = {}
     for jump in jumps:
         earlier = by_time.get(jump.time, Impact(jump.time, "", {}, {}))
@@ -294,38 +294,38 @@ def _impacts(run: HybridRun) -> tuple[Impact, ...]:
     return tuple(by_time.values())
 
 
-def _without_detours(changes: list[Change]) -> list[Change]:
-    """Changes of one instant without those by which a machine came back to a mode; but an impact stays."""
-    if len(changes) == 1 or any(change.impact for change in changes):
-        return changes
-    direct: list[Change] = []
-    for change in changes:
-        of_machine = [earlier for earlier in direct if earlier.machine is change.machine]
-        back = next((k for k, earlier in enumerate(of_machine) if earlier.before == change.after), None)
+def _without_detours(transitions: list[Transition]) -> list[Transition]:
+    """Transitions of one instant without those by which a machine came back to a mode; but an impact stays."""
+    if len(transitions) == 1 or any(transition.impact for transition in transitions):
+        return transitions
+    direct: list[Transition] = []
+    for transition in transitions:
+        of_machine = [earlier for earlier in direct if earlier.machine is transition.machine]
+        back = next((k for k, earlier in enumerate(of_machine) if earlier.before == transition.after), None)
         if back is None:
-            direct.append(change)
+            direct.append(transition)
         else:
             direct = [earlier for earlier in direct if earlier not in of_machine[back:]]
     return direct
 
 
-def _events(changes: Iterable[Change]) -> Iterator[tuple[float, str, str, str]]:
-    """Changes in words, without those that lead nowhere: what says the same before and after is none."""
+def _events(transitions: Iterable[Transition]) -> Iterator[tuple[float, str, str, str]]:
+    """Transitions in words, without those that lead nowhere: what says the same before and after is none."""
 
     @cache  # a motion may have thousands of a few kinds
     def in_words(machine: ModeMachine, before: str, after: str, rebound: bool) -> tuple[str, str, str]:  # noqa: FBT001
         return machine.name, machine.modes[before].words, "rebound" if rebound else machine.modes[after].words
 
-    at_once = (_without_detours([*one_time]) for _, one_time in groupby(changes, attrgetter("time")))
-    for change in chain.from_iterable(at_once):
-        name, was, now = in_words(change.machine, change.before, change.after, change.rebound)
+    at_once = (_without_detours([*one_time]) for _, one_time in groupby(transitions, attrgetter("time")))
+    for transition in chain.from_iterable(at_once):
+        name, was, now = in_words(transition.machine, transition.before, transition.after, transition.rebound)
         if was != now:
-            yield change.time, name, was, now
+            yield transition.time, name, was, now
 
 
 def _table(run: HybridRun) -> tuple[PhaseRow, ...]:
     """The phases in words: those that say the same are one."""
-    phases, machines = [phase for span in run.spans for phase in span.phases], run.equation_sets.machines
+    phases, machines = [phase for segment in run.segments for phase in segment.phases], run.equation_sets.machines
     last = run.demand.span[1]
     by_words: dict[tuple[str, ...], Mapping[str, str]] = {}
 

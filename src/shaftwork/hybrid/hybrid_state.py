@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import cached_property, partial
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -13,12 +13,10 @@ from sympy import Expr, Integer
 from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.code import Moves
-from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.codegen.timeline import Timeline
 from shaftwork.components.branches import INTEGRAL
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Leave, Mode
-from shaftwork.formulation.form import StateForm
 from shaftwork.hybrid.consistency import (
     clear_of_limit,
     drift,
@@ -29,7 +27,6 @@ from shaftwork.hybrid.consistency import (
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import ActiveGuard, ModeMachine, ModeNames
 from shaftwork.integrate.problem import Guards, Problem, changed
-from shaftwork.pipeline.model import Model
 
 Course = tuple[float, list[float], list[float], list[float]]
 """Time, states, their rates, and guards."""
@@ -38,8 +35,8 @@ Excess = tuple[float, ActiveGuard]
 """How far a guard is beyond its limit, or will be."""
 
 
-class Change(NamedTuple):
-    """A change of mode: when in s, of which machine, from which mode to which; or a rebound, back to the one before.
+class Transition(NamedTuple):
+    """When in s which machine passes from which mode to which; or a rebound, back to the mode before.
 
     With an impact speeds jump; sources of speed have given energy at once, and gears have lost some, in J by part.
     """
@@ -56,10 +53,10 @@ class Change(NamedTuple):
 
 def differences(
     t: float, machines: Sequence[ModeMachine], before: ModeNames, after: ModeNames, besides: Collection[int] = ()
-) -> list[Change]:
-    """The changes at a time in s from modes to others, in the order of the machines, but for some of these."""
+) -> list[Transition]:
+    """The transitions at a time in s from modes to others, in the order of the machines, but for some of these."""
     triples = enumerate(zip(machines, before, after, strict=True))
-    return [Change(t, *names) for k, names in triples if k not in besides and names[1] != names[2]]
+    return [Transition(t, *names) for k, names in triples if k not in besides and names[1] != names[2]]
 
 
 class Regime:
@@ -75,37 +72,23 @@ class Regime:
 
     def __init__(self, modes: ModeNames, equations: ModeEquations, p: Array, tick: float, longest: float) -> None:
         self.modes, self.equations, self.p, self.tick, self.longest = modes, equations, p, tick, longest
-        self.motion, self.limits, self.near = equations.motion(p)
+        self.model, self.form, self.stores = equations.model, equations.model.form, equations.stores
+        """The compiled equations, their state form, and what they store."""
+        self.machines = equations.machines
+        """Of the network."""
+        self.motion, self.guards_at, self.near = equations.motion(p)
         """Rates and guards at an instant; the guards alone; the guards around an instant, by the `moves` of states."""
         self.sizes, self.sides, self.watched = equations.sizes(p), equations.sides(modes), equations.watched(modes)
         """Nominal size of each state; on which side each guard is met; everything that may end one of the modes."""
-        self.successors: dict[int, Any] = {}
-        """By guard, where it leads in place; told when it is first met."""
-
-    @property
-    def model(self) -> Model:
-        """The compiled equations."""
-        return self.equations.model
-
-    @property
-    def form(self) -> StateForm:
-        """The state form of the equations."""
-        return self.equations.model.form
-
-    @property
-    def stores(self) -> StateTransfer:
-        """What the equations store."""
-        return self.equations.stores
+        self.right_side = partial(equations.right_side, p)
+        """Makes the right-hand side."""
+        self.in_place: dict[int, Any] = {}
+        """By guard, the in-place transition to which it leads, or None; found when it is first met."""
 
     @property
     def bound(self) -> BoundArrays:
         """The array program with its parameters."""
         return self.equations.bound(self.p)
-
-    @property
-    def machines(self) -> tuple[ModeMachine, ...]:
-        """Of the network."""
-        return self.equations.machines
 
     def mode(self, number: int) -> Mode:
         """The mode of a machine."""
@@ -126,11 +109,6 @@ class Regime:
     def ends(self) -> tuple[tuple[int, float], ...]:
         """Number and side of each guard that ends one of the modes."""
         return tuple((active.guard, active.side) for active in self.watched)
-
-    @cached_property
-    def right_side(self) -> Callable[[], Callable[[float, Array], Array]]:
-        """Makes the right-hand side."""
-        return partial(self.equations.right_side, self.p)
 
     @cached_property
     def moves(self) -> Moves:
@@ -171,10 +149,12 @@ class Regime:
             beside: the guards at `beside(here)`, where they are known.
         """
         now = here[3]
-        bands = [abs(near - guard) for near, guard in zip(beside or self.limits(*self.beside(here)), now, strict=True)]
+        bands = [
+            abs(near - guard) for near, guard in zip(beside or self.guards_at(*self.beside(here)), now, strict=True)
+        ]
         if not self.model.arrays.inputs.switching:
             return bands
-        other = self.limits(*self.beside(here, -1.0))
+        other = self.guards_at(*self.beside(here, -1.0))
         return [min(band, abs(near - guard)) for band, near, guard in zip(bands, other, now, strict=True)]
 
     def ahead(self, rates: list[float]) -> float:
@@ -235,7 +215,7 @@ class HybridState(NamedTuple):
         whole, sizes = regime.problem, equations.clock_sizes(span, self.x, regime.p)
         guards = whole.guards
         assert guards is not None  # noqa: S101 (which the equations give)
-        now = np.abs(regime.limits(span[0], self.x.tolist()))
+        now = np.abs(regime.guards_at(span[0], self.x.tolist()))
         return changed(
             whole,
             x0=np.concatenate([self.x, np.zeros(sizes.size)]),
@@ -251,14 +231,14 @@ class HybridState(NamedTuple):
         return self._replace(x=self.x + step * np.array(self.course(t)[2])) if step else self
 
 
-Transition = tuple[HybridState, list[Change]]
-"""The state that follows at an instant, and the changes of mode that lead there."""
+EventOutcome = tuple[HybridState, list[Transition]]
+"""The hybrid state that goes on after an event, and the transitions that lead there."""
 
 
 def exceeded(
     state: HybridState,
     t: float,
-    ended: HybridState,
+    before: HybridState,
     idle: Sequence[ActiveGuard] = (),
     *,
     in_order: bool = False,
@@ -269,8 +249,8 @@ def exceeded(
     Args:
         state: modes and states.
         t: s.
-        ended: the state before any change.
-        idle: guards that were met here already and change nothing.
+        before: the state before any transition.
+        idle: guards that were met here already and lead to no transition.
         in_order: whether the first one will be taken, and not the worst.
         again: whether modes have come back.
     """
@@ -278,8 +258,8 @@ def exceeded(
     beside, now = regime.course(*regime.beside(here)), here[3]
     bands = regime.bands(here, beside[3])
     wide = bands
-    if ended.bands and ended.regime.equations is regime.equations:
-        wide = list(map(max, bands, ended.bands))
+    if before.bands and before.regime.equations is regime.equations:
+        wide = list(map(max, bands, before.bands))
     beyond, on_limit, clear = [], [], [0.0] * len(now)
     for active in regime.watched:
         excess = active.side * now[active.guard]
@@ -344,14 +324,14 @@ def _further(regime: Regime, step: float, here: Course, *, bends: bool) -> Cours
 
 def passes_limit(state: HybridState, t: float) -> bool:
     """Whether the states are beyond a guard of the modes by more than rounding moves it."""
-    now = state.regime.limits(t, state.x.tolist())
+    now = state.regime.guards_at(t, state.x.tolist())
     wide = state.bands or [0.0] * len(now)
     watched = state.regime.watched
     return any(side_of_limit(active.side * now[active.guard], wide[active.guard]) > 0 for active in watched)
 
 
 def resting(state: HybridState, t: float) -> dict[int, str]:
-    """Elements that slip, with no speed across them as others hold their ends, and the modes in which they hold."""
+    """Machines that slip, with no speed across them as others hold their ends, and the modes in which they hold."""
     regime, slipping = state.regime, dict[int, ActiveGuard]()
     for active in regime.watched:
         k = active.machine
@@ -361,7 +341,7 @@ def resting(state: HybridState, t: float) -> dict[int, str]:
     if not slipping:
         return {}
     here = state.course(t)
-    now, near, still = here[3], regime.limits(*regime.beside(here)), regime.equations.resting
+    now, near, still = here[3], regime.guards_at(*regime.beside(here)), regime.equations.resting
     return {
         k: active.leave.to
         for k, active in slipping.items()

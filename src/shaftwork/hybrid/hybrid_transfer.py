@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 
 from shaftwork.core.errors import NetworkError, ParameterError, SimulationError
 from shaftwork.formulation.value_diagnosis import jamming
-from shaftwork.hybrid.consistency import AHEAD_OF_RUN, ROUNDINGS
+from shaftwork.hybrid.consistency import time_scales
 from shaftwork.hybrid.equation_sets import EquationSets
 from shaftwork.hybrid.hybrid_state import HybridState, Regime
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
@@ -15,12 +14,11 @@ from shaftwork.hybrid.modes.mode_machines import ModeNames, with_modes
 from shaftwork.hybrid.modes.starts import begins_anew
 from shaftwork.pipeline.motion_start import Ending
 
-BEYOND = 1e-6
-"""How far in rad a motion may start beyond a rigid limit: errors and printed digits of another run leave so much."""
-
 
 class HybridTransfer:
-    """The combinations of modes of a network for one set of values; each is made when it is first needed.
+    """Takes all that is stored from one combination of modes to another, for one set of values of the parameters.
+
+    It makes the regime of a combination, its equations with these values, when it is first needed, and keeps it.
 
     Args:
         equation_sets: the sets of equations.
@@ -38,7 +36,7 @@ class HybridTransfer:
     ) -> None:
         self._equation_sets, self._values, self._equations_of = equation_sets, dict(values), equations_of
         self.first, self.machines = equation_sets.first, equation_sets.machines
-        self._times = ROUNDINGS * math.ulp(max(map(abs, span))), AHEAD_OF_RUN * (span[1] - span[0])
+        self._times = time_scales(span)
         self._regimes: dict[ModeNames, Regime] = {}
 
     def regime(self, modes: ModeNames) -> Regime:
@@ -64,18 +62,18 @@ class HybridTransfer:
             return False
         return True
 
-    def joinable(self, modes: ModeNames, joins: Mapping[int, str]) -> Mapping[int, str]:
+    def compatible(self, modes: ModeNames, holding: Mapping[int, str]) -> Mapping[int, str]:
         """Of machines and the modes in which they hold all that agree, the first before the others.
 
         Beside a prescribed speed that is zero by now not all of them can.
         """
-        if self.possible(with_modes(modes, joins)):
-            return joins
-        joined: dict[int, str] = {}
-        for k, name in joins.items():
-            if self.possible(with_modes(modes, {**joined, k: name})):
-                joined[k] = name
-        return joined
+        if self.possible(with_modes(modes, holding)):
+            return holding
+        compatible: dict[int, str] = {}
+        for k, name in holding.items():
+            if self.possible(with_modes(modes, {**compatible, k: name})):
+                compatible[k] = name
+        return compatible
 
     def with_stored(self, modes: ModeNames, t: float, stored: Mapping[str, float]) -> HybridState:
         """A state in the given modes that takes up what was stored, with the inputs of a time in s.
@@ -84,7 +82,7 @@ class HybridTransfer:
             NetworkError: the equations of these modes contradict each other.
         """
         new = self.regime(modes)
-        return HybridState(new, new.equations.taking(t, stored, new.p))
+        return HybridState(new, new.equations.states_from(t, stored, new.p))
 
     def to_modes(self, state: HybridState, t: float, modes: ModeNames) -> HybridState:
         """The same instant in other modes: all that is stored goes over.
@@ -135,21 +133,22 @@ def mode_anew(state: HybridState, t: float, number: int) -> str:
     )
 
 
-def refuse_beyond(state: HybridState, t: float) -> None:
+def refuse_beyond(state: HybridState, t: float, tolerated: float = 1e-6) -> None:
     """Refuse a start beyond a rigid limit, where no motion leads.
 
     Args:
-        state: in the modes in which nothing is joined.
+        state: in the modes in which no machine is rigid.
         t: s.
+        tolerated: how far beyond in rad: errors and printed digits of another run leave so much.
 
     Raises:
         ParameterError: names the part, its twist and the limit.
     """
     regime = state.regime
-    now = regime.limits(t, state.x.tolist())
+    now = regime.guards_at(t, state.x.tolist())
     for active in regime.watched:
         machine, beyond = regime.machines[active.machine], active.side * now[active.guard]
-        if active.leave.rebound is None or not beyond > BEYOND:
+        if active.leave.rebound is None or not beyond > tolerated:
             continue
         limit, slope = regime.twist_limit(active.machine, active.leave)
         raise ParameterError(

@@ -97,7 +97,7 @@ class Guards:
     sizes: Array
 
 
-class Reaction(NamedTuple):
+class Reset(NamedTuple):
     """How a run goes on past a guard in the same equations.
 
     Args:
@@ -149,10 +149,10 @@ class StickingError(SeriesError):
         self.driven_back = driven_back
 
 
-class React(Protocol):
+class PastGuards(Protocol):
     """How a run goes on past guards; only engines that gain by it ask."""
 
-    def __call__(self, number: int, met: int, t: float, x: Array) -> Reaction | None:
+    def __call__(self, number: int, met: int, t: float, x: Array) -> Reset | None:
         """How it goes on in the same equations with the same state, or None where it must end.
 
         Args:
@@ -225,7 +225,7 @@ class Problem(TimedProblem):
         switches: what makes the right-hand side jump or bend where its sign changes with the motion, from times (k,)
             and states (k, n) to (k, m), or None where nothing does. An engine ends a step at such a change
             (`Crossings`), or finds it by its own means.
-        react: how the run goes on past guards, or None where each of them ends it.
+        past_guards: how the run goes on past guards, or None where each of them ends it.
         linear: the same system in linear form, where it is one; else None.
         observed: all quantities of a linear network, or None.
         symbolic: the same system as a heyoka program with its parameters (`codegen.taylor.heyoka.BoundProgram`), a
@@ -240,7 +240,7 @@ class Problem(TimedProblem):
     rhs: Callable[[float, Array], Array]
     jacobian: Callable[[float, Array], Any] | None
     switches: Callable[[Array, Array], Array] | None = None
-    react: React | None = None
+    past_guards: PastGuards | None = None
     linear: LinearInputs | None = None
     observed: Observed | None = None
     symbolic: Any = None

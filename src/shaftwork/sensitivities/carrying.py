@@ -18,7 +18,7 @@ from shaftwork.sensitivities.legs import LATE, Leg
 
 if TYPE_CHECKING:
     from shaftwork.hybrid.equation_sets import EquationSets
-    from shaftwork.hybrid.hybrid_state import Change
+    from shaftwork.hybrid.hybrid_state import Transition
     from shaftwork.hybrid.modes.mode_equations import ModeEquations
     from shaftwork.hybrid.modes.mode_machines import ModeNames
 
@@ -74,7 +74,9 @@ class SensitivityTransfer:
     ) -> None:
         self._equation_sets, self._equations, self._sizes = equation_sets, equations, sizes
 
-    def over(self, before: Leg, after: Leg, ends: Sequence[End], changes: Sequence[Change]) -> tuple[int, Array]:
+    def over(
+        self, before: Leg, after: Leg, ends: Sequence[End], transitions: Sequence[Transition]
+    ) -> tuple[int, Array]:
         """Which of the ends it was, and the total derivatives (n', m) of the new states.
 
         The modes that a run goes through within an instant are tried as they may follow each other; what leads to the
@@ -84,13 +86,13 @@ class SensitivityTransfer:
             before: the leg that ends.
             after: the next one.
             ends: where one leg goes over into the other, as far as that is known; the likeliest first.
-            changes: of mode, at that time.
+            transitions: at that time.
 
         Raises:
             SimulationError: none of them leads there.
         """
         sizes, candidates = self._sizes(after.model), list[tuple[float, int, Array]]()
-        for (k, end), steps in product(enumerate(ends), self._paths(before, after, changes)):
+        for (k, end), steps in product(enumerate(ends), self._paths(before, after, transitions)):
             try:
                 states, slopes = self._along(steps, before, after.low, end)
             except NetworkError:
@@ -99,45 +101,47 @@ class SensitivityTransfer:
         nearest = min((away for away, *_ in candidates), default=np.inf)
         if nearest <= LATE:
             return next((k, slopes) for away, k, slopes in candidates if away <= nearest + TYPED)
-        names = ", ".join(dict.fromkeys(f"'{change.machine.name}'" for change in changes)) or "parts"
+        names = ", ".join(dict.fromkeys(f"'{transition.machine.name}'" for transition in transitions)) or "parts"
         raise SimulationError(
             f"At t = {after.start:.9g} s {names} change together, and how the derivatives pass that is not known here. "
             "Take the difference of two variants, studies.sweep(...)."
         )
 
-    def _paths(self, before: Leg, after: Leg, changes: Sequence[Change]) -> Iterable[tuple[_ModeStep, ...]]:
+    def _paths(self, before: Leg, after: Leg, transitions: Sequence[Transition]) -> Iterable[tuple[_ModeStep, ...]]:
         """Paths to the modes that follow, the plainest first."""
-        paths = (self._path(before.modes, after.modes, changes, besides=besides) for besides in (False, True))
+        paths = (self._path(before.modes, after.modes, transitions, besides=besides) for besides in (False, True))
         return dict.fromkeys(paths)
 
     def _path(
-        self, modes: ModeNames, last: ModeNames, changes: Sequence[Change], *, besides: bool
+        self, modes: ModeNames, last: ModeNames, transitions: Sequence[Transition], *, besides: bool
     ) -> tuple[_ModeStep, ...]:
-        """One path, on which each impact takes up what is stored, and in the end all changes together.
+        """One path, on which each impact takes up what is stored, and in the end all transitions together.
 
         Args:
             modes: before.
             last: after.
-            changes: in their order.
+            transitions: in their order.
             besides: in an impact other machines are already in the modes that follow.
         """
         from shaftwork.hybrid.modes.mode_machines import with_modes
 
         numbers = {id(machine): k for k, machine in enumerate(self._equation_sets.machines)}
         steps: list[_ModeStep] = []
-        for place, change in enumerate(changes):
-            number = numbers[id(change.machine)]
-            if not change.impact:
-                modes = with_modes(modes, {number: change.after})
+        for place, transition in enumerate(transitions):
+            number = numbers[id(transition.machine)]
+            if not transition.impact:
+                modes = with_modes(modes, {number: transition.after})
                 continue
-            others = {numbers[id(later.machine)]: later.after for later in changes[place + 1 :] if not later.impact}
-            modes = with_modes(modes, {**(others if besides else {}), number: change.after})
-            if not change.rebound:
+            others = {numbers[id(later.machine)]: later.after for later in transitions[place + 1 :] if not later.impact}
+            modes = with_modes(modes, {**(others if besides else {}), number: transition.after})
+            if not transition.rebound:
                 steps.append(_ModeStep(modes))
                 continue
-            leaves = change.machine.modes[change.before].leaves
-            share = next(leave.rebound for leave in leaves if leave.rebound is not None and leave.to == change.after)
-            parted = with_modes(modes, {number: change.before})
+            leaves = transition.machine.modes[transition.before].leaves
+            share = next(
+                leave.rebound for leave in leaves if leave.rebound is not None and leave.to == transition.after
+            )
+            parted = with_modes(modes, {number: transition.before})
             steps.append(_ModeStep(modes, (number, share), parted))
             modes = parted
         if not steps or (steps[-1].parted or steps[-1].modes) != last:
@@ -195,10 +199,10 @@ class SensitivityTransfer:
         shown, nowhere = self._equations(equations.model).shown(expression), np.zeros(len(equations.model.states))
         share = float(shown.value(np.zeros(1), nowhere[None, :], p)[0, 0])
         by_parameters = shown.slopes(0.0, nowhere, p)[1]
-        change = {name: value - before.values[name] for name, value in joined.values.items()}
-        values = {name: value + share * change[name] for name, value in joined.values.items()}
+        gain = {name: value - before.values[name] for name, value in joined.values.items()}
+        values = {name: value + share * gain[name] for name, value in joined.values.items()}
         slopes = {
-            name: slope + share * (slope - before.slopes[name]) + by_parameters * change[name]
+            name: slope + share * (slope - before.slopes[name]) + by_parameters * gain[name]
             for name, slope in joined.slopes.items()
         }
         return _StoredWithDerivatives(values, slopes)

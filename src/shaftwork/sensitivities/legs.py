@@ -24,8 +24,8 @@ from shaftwork.sensitivities.differentiation import Differentiated
 if TYPE_CHECKING:
     from shaftwork.hybrid.equation_sets import EquationSets
     from shaftwork.hybrid.hybrid_model import HybridModel
-    from shaftwork.hybrid.hybrid_run import HybridRun, Span
-    from shaftwork.hybrid.hybrid_state import Change
+    from shaftwork.hybrid.hybrid_run import HybridRun, Segment
+    from shaftwork.hybrid.hybrid_state import Transition
     from shaftwork.hybrid.modes.mode_equations import ModeEquations
     from shaftwork.hybrid.modes.mode_machines import ModeNames
 
@@ -129,14 +129,14 @@ class DifferentiatedMotion:
     Args:
         solution: the motion, to be read.
         legs: its smooth spans.
-        changes: of modes, in their order.
+        transitions: in their order.
         start: what it starts from, in the equations in which nothing is joined; None where no part changes its mode.
         equation_sets: the sets of equations, likewise.
     """
 
     solution: Solution
     legs: tuple[Leg, ...]
-    changes: tuple[Change, ...] = ()
+    transitions: tuple[Transition, ...] = ()
     start: Leg | None = None
     equation_sets: EquationSets | None = None
 
@@ -171,15 +171,15 @@ def _through_phases(model: HybridModel, span: tuple[float, float], initial: Give
         model.equation_sets, {}, Demand(span, rtol, None, None, "auto", Problem.max_steps, None), by_combination=True
     )
     run.march(initial)
-    legs, changes = tuple(_legs_of_run(run)), tuple(run.changes)
-    return DifferentiatedMotion(solution(run, model.name), legs, changes, _start(run, initial), model.equation_sets)
+    legs, transitions = tuple(_legs_of_run(run)), tuple(run.transitions)
+    return DifferentiatedMotion(solution(run, model.name), legs, transitions, _start(run, initial), model.equation_sets)
 
 
 def _start(run: HybridRun, initial: Given) -> Leg:
-    equation_sets, span = run.equation_sets, run.demand.span
-    equations, p = equation_sets.first_equations({})
+    regime, span = run.event_iteration.transfer.regime(run.equation_sets.first), run.demand.span
+    equations, p = regime.equations, regime.p
     x, _ = equations.model.start(equations.prepared(p), initial, span)
-    after = run.timeline(equations, p).sides(span[0])[1]
+    after = run.timeline(regime).sides(span[0])[1]
     return Leg(
         start=span[0],
         end=span[0],
@@ -190,7 +190,7 @@ def _start(run: HybridRun, initial: Given) -> Leg:
         dense=lambda times: np.tile(x, (len(times), 1)),
         steps=np.array([span[0]]),
         equations=equations,
-        modes=equation_sets.first,
+        modes=regime.modes,
     )
 
 
@@ -210,21 +210,20 @@ def _refuse_impulses(motion: DifferentiatedMotion) -> None:
 
 def _legs_of_run(run: HybridRun) -> Iterator[Leg]:
     """The legs of a motion through phases."""
-    for span, end in zip(
-        run.spans, [*(span.phases[0].start for span in run.spans[1:]), run.demand.span[1]], strict=True
-    ):
-        starts = [phase.start for phase in span.phases]
-        for phase, (start, stop) in zip(span.phases, pairwise([*starts, end]), strict=True):
+    ends = [*(segment.phases[0].start for segment in run.segments[1:]), run.demand.span[1]]
+    for segment, end in zip(run.segments, ends, strict=True):
+        starts = [phase.start for phase in segment.phases]
+        for phase, (start, stop) in zip(segment.phases, pairwise([*starts, end]), strict=True):
             if stop > start:
                 equations, p = phase.regime.equations, phase.regime.p
-                instants = run.timeline(equations, p)
-                leg = _leg(equations.model, p, _states(span), span.trajectory.steps, (start, stop), instants)
+                instants = run.timeline(phase.regime)
+                leg = _leg(equations.model, p, _states(segment), segment.trajectory.steps, (start, stop), instants)
                 yield replace(leg, equations=equations, modes=phase.regime.modes)
 
 
-def _states(span: Span) -> Callable[[Array], Array]:
+def _states(segment: Segment) -> Callable[[Array], Array]:
     """Those of the equations, without their clocks."""
-    size, dense = len(span.phases[0].regime.model.states), span.trajectory.dense
+    size, dense = len(segment.phases[0].regime.model.states), segment.trajectory.dense
     return lambda times: dense(times)[:, :size]
 
 

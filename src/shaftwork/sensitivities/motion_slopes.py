@@ -31,7 +31,7 @@ from shaftwork.sensitivities.legs import DifferentiatedMotion, Leg, parted
 from shaftwork.sensitivities.saltation import ADVICE, Jump, JumpConditions, by_chance
 
 if TYPE_CHECKING:
-    from shaftwork.hybrid.hybrid_state import Change
+    from shaftwork.hybrid.hybrid_state import Transition
 
 STAGES = 6
 """Of a step: order 12, and no stage on its ends, where laws jump."""
@@ -245,13 +245,13 @@ class MotionSlopes:
             size, first = len(self.legs[0].model.states), np.zeros((len(motion.start.model.states), count))
             loose, leg = motion.start, self.legs[0]
             end = End(loose.at(loose.high)[1], leg.at(leg.low)[1], first, fixed)
-            slopes[:size] = carrying.over(loose, leg, [end], self._changes(leg))[1]
+            slopes[:size] = carrying.over(loose, leg, [end], self._transitions(leg))[1]
         self._shifts.append(fixed)
         doubts: list[tuple[float, float]] = []
         last: Jump | None = None
         for k, leg in enumerate(self.legs):
             if k:
-                jump = jumps.over(self.legs[k - 1], leg, slopes, self._changes(leg))
+                jump = jumps.over(self.legs[k - 1], leg, slopes, self._transitions(leg))
                 if last is not None and self.legs[k - 1].end - self.legs[k - 1].start <= TYPED * length:
                     self._refuse_chance(leg, last, jump, length)
                 slopes, last = jump.slopes, jump
@@ -290,8 +290,8 @@ class MotionSlopes:
         equations = self.equations(leg.model)
         return lambda times: equations.coefficients(*leg.read(times), leg.p)
 
-    def _changes(self, leg: Leg) -> list[Change]:
-        return [] if leg.turned else [change for change in self._motion.changes if change.time == leg.start]
+    def _transitions(self, leg: Leg) -> list[Transition]:
+        return [] if leg.turned else [one for one in self._motion.transitions if one.time == leg.start]
 
     @cached_property
     def steps(self) -> Array:

@@ -28,7 +28,7 @@ from shaftwork.sensitivities.differentiation import Differentiated
 from shaftwork.sensitivities.legs import LATE, Leg
 
 if TYPE_CHECKING:
-    from shaftwork.hybrid.hybrid_state import Change
+    from shaftwork.hybrid.hybrid_state import Transition
 
 ADVICE = "Take the difference of two variants, studies.sweep(...)."
 
@@ -39,13 +39,13 @@ class _Cause:
 
     Args:
         argument: in states, parameters and time; it is zero at the instant.
-        change: of mode, or None.
+        transition: from one mode to another, or None.
         late: how long ago, in s, what may be thrown back was at its limit: the run finds it beyond, as far as rounding
             hides it, and as a rule goes back there for the impact.
     """
 
     argument: Expr
-    change: Change | None = None
+    transition: Transition | None = None
     late: float = 0.0
 
 
@@ -145,21 +145,21 @@ class JumpConditions:
         self._equations, self._carrying, self._sizes, self._swiftest = equations, carrying, sizes, swiftest
         self._span = span
 
-    def over(self, before: Leg, after: Leg, slopes: Array, changes: Sequence[Change]) -> Jump:
+    def over(self, before: Leg, after: Leg, slopes: Array, transitions: Sequence[Transition]) -> Jump:
         """From one leg to the next.
 
         Args:
             before: the leg that ends.
             after: the next one.
             slopes: (N, m) derivatives at its end, of the states and of what is integrated.
-            changes: of mode, at that time.
+            transitions: at that time.
 
         Raises:
             SimulationError: there is no derivative, or none that is known.
         """
         old, new = self._side(before, before.high), self._side(after, after.low)
-        adds = before.model is after.model and not any(change.impact for change in changes)
-        causes = list(self._causes(old, new, changes))
+        adds = before.model is after.model and not any(transition.impact for transition in transitions)
+        causes = list(self._causes(old, new, transitions))
         late = max((cause.late for cause in causes), default=0.0)
         ends = [self._crossing(old, new, slopes, causes, back) for back in dict.fromkeys((late, 0.0))]
         single = [end for end in ends if len(end.groups) <= 1]
@@ -167,7 +167,7 @@ class JumpConditions:
             return Jump(self._one_by_one(old, new, slopes, ends[-1].groups, adds=adds), None, adds, 0.0)
         end, total = single[-1], single[-1].total
         if self._carrying is not None and not adds:
-            k, carried = self._carrying.over(before, after, [one.end for one in single], changes)
+            k, carried = self._carrying.over(before, after, [one.end for one in single], transitions)
             end, total = single[k], np.concatenate([carried, single[k].total[len(old.x) :]])
         new_slopes = self._later(end.new, total - np.outer(end.new.rates, end.shift), end.late)
         share = self._share(before.model, slopes, new_slopes) if adds else 1.0
@@ -209,7 +209,7 @@ class JumpConditions:
         by_states, by_parameters = equations.coefficients(np.array([side.t]), side.x[None, :], side.leg.p)
         return np.asarray(slopes + step * (by_states[0] @ slopes[: len(side.x)] + by_parameters[0]))
 
-    def _causes(self, old: _Side, new: _Side, changes: Sequence[Change]) -> Iterator[_Cause]:
+    def _causes(self, old: _Side, new: _Side, transitions: Sequence[Transition]) -> Iterator[_Cause]:
         """All that happens at an instant by itself, and not in consequence of something else there."""
         leg = old.leg
         yield from map(_Cause, leg.model.switching.passed(leg.p, leg.high, new.leg.low))
@@ -218,28 +218,28 @@ class JumpConditions:
                 raise _touched(new.leg, f"a law that changes with the sign of {argument}")
             yield _Cause(argument)
         instant = leg.model.switching.passed(leg.p, leg.high, new.leg.low, modes=True)
-        met = sorted(self._met(old, changes), key=lambda pair: pair[0])
+        met = sorted(self._met(old, transitions), key=lambda pair: pair[0])
         near = [TYPED if instant or k else LATE for k in range(len(met))]
         caused = [cause for (away, cause), most in zip(met, near, strict=True) if away <= most * self._span]
-        if changes and not (caused or instant):
+        if transitions and not (caused or instant):
             raise SimulationError(
                 f"At t = {new.leg.start:.9g} s it cannot be told what has changed the mode of "
-                f"'{changes[0].machine.name}', and so not how the time of it depends on the parameters. {ADVICE}"
+                f"'{transitions[0].machine.name}', and so not how the time of it depends on the parameters. {ADVICE}"
             )
         yield from caused
 
-    def _met(self, old: _Side, changes: Sequence[Change]) -> Iterator[tuple[float, _Cause]]:
+    def _met(self, old: _Side, transitions: Sequence[Transition]) -> Iterator[tuple[float, _Cause]]:
         """Guards of what changes that are about to be met, and how soon in s."""
         leg = old.leg
-        first: dict[int, Change] = {}
+        first: dict[int, Transition] = {}
         if leg.equations is None:
             return
-        for change in changes:
-            first.setdefault(id(change.machine), change)
+        for transition in transitions:
+            first.setdefault(id(transition.machine), transition)
         for watched in leg.equations.watched(leg.modes):
             ended = first.get(id(leg.equations.machines[watched.machine]))
             if ended is not None:
-                guard = leg.equations.guards_shown[watched.guard]
+                guard = leg.equations.expressions[watched.guard]
                 value, rate = self._course(old, guard)
                 if watched.side * rate > 0:
                     back = 0.0 if watched.leave.rebound is None else max(value / rate, 0.0)
@@ -297,11 +297,11 @@ class JumpConditions:
     def _after(self, old: _Side, new: _Side, causes: Sequence[_Cause]) -> Array:
         """The rates after some causes alone."""
         leg, p = old.leg, old.leg.p.copy()
-        laws = [cause.argument for cause in causes if cause.change is None]
-        for change in (cause.change for cause in causes if cause.change is not None):
+        laws = [cause.argument for cause in causes if cause.transition is None]
+        for transition in (cause.transition for cause in causes if cause.transition is not None):
             names = tuple(leg.model.parameters)
-            if change.machine.number in names:
-                p[names.index(change.machine.number)] = change.machine.modes[change.after].value
+            if transition.machine.number in names:
+                p[names.index(transition.machine.number)] = transition.machine.modes[transition.after].value
         return self._equations(leg.model).rates_past(laws, new.t, old.t, old.x, p)
 
 
@@ -314,10 +314,10 @@ def by_chance(leg: Leg, what: str) -> SimulationError:
 
 
 def _worded(cause: _Cause) -> str:
-    if cause.change is None:
+    if cause.transition is None:
         return f"the switch of a law by {cause.argument}"
-    machine, before, after = cause.change.machine, cause.change.before, cause.change.after
-    return f"the change of '{machine.name}' from {machine.modes[before].words} to {machine.modes[after].words}"
+    machine, before, after = cause.transition.machine, cause.transition.before, cause.transition.after
+    return f"the transition of '{machine.name}' from {machine.modes[before].words} to {machine.modes[after].words}"
 
 
 def _touched(leg: Leg, what: str) -> SimulationError:

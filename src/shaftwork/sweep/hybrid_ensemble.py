@@ -11,13 +11,12 @@ import numpy as np
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import CompileError
 from shaftwork.hybrid.consistency import (
-    AHEAD_OF_RUN,
-    ROUNDINGS,
     clear_of_limit,
     drift,
     moved_by_rounding,
     rounding_moves,
     side_of_limit,
+    time_scales,
 )
 from shaftwork.hybrid.equation_sets import EquationSets
 from shaftwork.hybrid.hybrid_model import HybridModel
@@ -68,9 +67,9 @@ class HybridEnsemble(Ensemble):
         met = [active for active in equations.watched(group.modes) if active.guard == guard]
         if len(met) != 1 or met[0].leave.rebound is not None:
             return []
-        ended, number, count = met[0], met[0].machine, group.lanes.size
-        names = [ended.leave.to] * count
-        if not ended.leave.to:
+        crossed, number, count = met[0], met[0].machine, group.lanes.size
+        names = [crossed.leave.to] * count
+        if not crossed.leave.to:
             before, parameters = group.modes[number], p[: len(equations.model.parameters)]
             starts = zip(group.t.tolist(), group.x.T, parameters.T, strict=True)
             names = [equations.start_of(number, before, *start) for start in starts]
@@ -101,8 +100,7 @@ class GuardedEquations(EnsembleEquations):
     ) -> None:
         super().__init__(code, base, equations.sizes(base), names)
         self.sides = equations.sides(modes)
-        self._tick = ROUNDINGS * float(np.spacing(max(map(abs, span))))
-        self._longest = AHEAD_OF_RUN * (span[1] - span[0])
+        self._tick, self._longest = time_scales(span)
         self._moves = np.array(rounding_moves(self.sizes.tolist())).T[:, :, None]
 
     def entered(self, t: Array, x: Array, p: Array) -> PhaseEntry:

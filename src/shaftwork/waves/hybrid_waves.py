@@ -7,8 +7,8 @@ delay engine goes through all sets of equations.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from functools import cached_property, partial
+from collections.abc import Mapping
+from functools import cached_property
 
 import numpy as np
 
@@ -47,10 +47,10 @@ class WaveModeEquations(ModeEquations):
         names = (*self.ends, *(RATE + name for name in self.ends))
         return dict(zip(names, x[len(self.model.states) :].tolist(), strict=True))
 
-    def taking(self, t: float, stored: Mapping[str, float], p: Array) -> Array:
+    def states_from(self, t: float, stored: Mapping[str, float], p: Array) -> Array:
         """The states with which the equations take up what was stored, and what arrives; zero of what is not told."""
         names = (*self.ends, *(RATE + name for name in self.ends))
-        return np.concatenate([super().taking(t, stored, p), [stored.get(name, 0.0) for name in names]])
+        return np.concatenate([super().states_from(t, stored, p), [stored.get(name, 0.0) for name in names]])
 
     def sizes(self, p: Array) -> list[float]:
         """The nominal size of each state; of what arrives that of a wave with a nominal speed."""
@@ -96,7 +96,7 @@ class WaveRun:
         return March(delay_problem(self._system, before, self._start), self._span).arriving(t)
 
     def solve(self, regime: Regime, problem: Problem) -> Trajectory:
-        """One span of the motion, in the modes of a regime; states, and behind them what arrives."""
+        """One segment of the motion, in the modes of a regime; states, and behind them what arrives."""
         equations = regime.equations
         system, x = WaveSystem(equations.bound(regime.p)), problem.x0[: len(equations.model.states)]
         delayed = delay_problem(
@@ -108,10 +108,6 @@ class WaveRun:
             self._equations[regime] = self._march.go_on(delayed, self._equations.get(regime))
             self._march.run()
             return self._march.last()
-
-    def solver(self, regime: Regime) -> Callable[[Problem], Trajectory]:
-        """What solves a span in the modes of a regime."""
-        return partial(self.solve, regime)
 
     @cached_property
     def left(self) -> Left:

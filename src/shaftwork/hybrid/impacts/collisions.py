@@ -34,7 +34,7 @@ from shaftwork.core.errors import SimulationError
 from shaftwork.hybrid.consistency import CLEAR, NOTHING
 from shaftwork.hybrid.hybrid_state import HybridState, Regime
 from shaftwork.hybrid.hybrid_transfer import HybridTransfer
-from shaftwork.hybrid.impacts.impulses import NOTHING_OF, Blow, ImpactStage, ImpactStart, Impulses, summed
+from shaftwork.hybrid.impacts.impulses import NOTHING_OF, ImpactStage, ImpactStart, ImpulseOutcome, Impulses, summed
 from shaftwork.hybrid.modes.mode_equations import KEPT
 from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, GivesWay, ModeMachine, ModeNames, limited, with_modes
 
@@ -196,15 +196,15 @@ class Collisions:
         both_ways = tuple[Contact, ...]()
         if all(contact.number != number for contact in contacts):  # it carries both ways, as a switch that closes
             both_ways = (Contact(number, 0.0, modes[number], leave.to),)
-            stages = self.joined(t, begins, {number: leave.to})
-            begins = self._impulses.begins(stages[-1].blow.after, t)
+            stages = self.join(t, begins, {number: leave.to})
+            begins = self._impulses.begins(stages[-1].outcome.after, t)
         stages += self._compressed(t, begins, contacts)
         if back.any():
             stages += self._thrown_back(t, contacts, stages, back)
         least = NO_IMPACT * max(1.0, np.abs(before).max(initial=0.0))
         pressed = zip(contacts, _pressed(stages), strict=True)
         hit = [c for c, impulse in pressed if c.leave and ((meets and impulse > 0) or is_wanted(c))]
-        after, closed, further = self._ended(t, modes, contacts, stages, least, hit)
+        after, closed, further = self._closed_at_end(t, modes, contacts, stages, least, hit)
         owners = (self._machines[contact.number].part.name for contact in contacts)
         taken = [{part: lost} for part, lost in zip(owners, self._taken(t, contacts, stages).tolist(), strict=True)]
         stages += further
@@ -241,11 +241,11 @@ class Collisions:
         start = self._apart(before, state, modes, contacts)
         stages = self._compressed(t, start, contacts)
         hit = [c for c, i in zip(contacts, _pressed(stages), strict=True) if i > 0]
-        after, _, further = self._ended(t, modes, contacts, stages, least, hit)
+        after, _, further = self._closed_at_end(t, modes, contacts, stages, least, hit)
         passed = stages if _pressed(stages).any() or not further else ()  # sources jump with what passes
         return after, (*passed, *further)
 
-    def _ended(
+    def _closed_at_end(
         self,
         t: float,
         before: ModeNames,
@@ -259,7 +259,7 @@ class Collisions:
 
         No impulse tells whether these press. Where they would take one, each is joined as its ends still come together.
         """
-        after = stages[-1].blow.after
+        after = stages[-1].outcome.after
         mobility, opens = self._mobility(t, after, contacts)
         closed = [c for c, u in zip(contacts, opens, strict=True) if u <= least and (c.leave is None or c in hit)]
         modes = with_modes(after.regime.modes, self._slipping(t, before, after, least))
@@ -277,35 +277,35 @@ class Collisions:
             speed, contact = min(zip(opens_at(t, apart, open_yet), open_yet, strict=True), key=itemgetter(0))
             if speed >= -least:
                 break
-            joined = self.joined(t, self._impulses.begins(apart, t), {contact.number: contact.joined})
-            if apart.differs(joined[-1].blow.after, t, least):
-                further += joined
-            apart = joined[-1].blow.after
+            stages = self.join(t, self._impulses.begins(apart, t), {contact.number: contact.joined})
+            if apart.differs(stages[-1].outcome.after, t, least):
+                further += stages
+            apart = stages[-1].outcome.after
             open_yet.remove(contact)
         return apart, [c for c in closed if c not in open_yet], further
 
     def _compressed(self, t: float, begins: ImpactStart, contacts: Sequence[Contact]) -> tuple[ImpactStage, ...]:
         """Until nothing closes any more, with all contacts open; where nothing stops them, what closes is joined."""
 
-        def compressed(start: ImpactStart, _: Sequence[ImpactStage]) -> Blow:
+        def compressed(start: ImpactStart, _: Sequence[ImpactStage]) -> ImpulseOutcome:
             modes = start.state.regime.modes
             state = start.state if start.t == t else self._transfer.with_stored(modes, t, start.stored)
             mobility, opens = self._mobility(t, state, contacts)
             impulses = complementary(mobility.W, opens)
             if impulses is not None:
-                return _blow(state, mobility, impulses)
+                return _outcome(state, mobility, impulses)
             closing = {c.number: c.joined for c, u in zip(contacts, opens, strict=True) if u < 0}
-            joined = self._transfer.to_modes(state, t, with_modes(modes, closing))
-            return Blow(joined, joined.regime, np.zeros(len(contacts)))
+            closed = self._transfer.to_modes(state, t, with_modes(modes, closing))
+            return ImpulseOutcome(closed, closed.regime, np.zeros(len(contacts)))
 
         return self._impulses.stages(t, begins, compressed)
 
-    def joined(self, t: float, begins: ImpactStart, joins: Mapping[int, str]) -> tuple[ImpactStage, ...]:
-        """Elements are joined at once, by what impulses it takes."""
+    def join(self, t: float, begins: ImpactStart, rigid: Mapping[int, str]) -> tuple[ImpactStage, ...]:
+        """Machines join their ends at once, in the modes given, by the impulses that it takes."""
 
-        def joined(start: ImpactStart, _: Sequence[ImpactStage]) -> Blow:
-            after = self._transfer.to_modes(start.state, t, with_modes(start.state.regime.modes, joins))
-            return Blow(after, after.regime)
+        def joined(start: ImpactStart, _: Sequence[ImpactStage]) -> ImpulseOutcome:
+            after = self._transfer.to_modes(start.state, t, with_modes(start.state.regime.modes, rigid))
+            return ImpulseOutcome(after, after.regime)
 
         return self._impulses.stages(t, begins, joined)
 
@@ -319,7 +319,7 @@ class Collisions:
         """
         shares, energy = back * _pressed(compression), self._returned(t, contacts, compression, back)
 
-        def thrown(start: ImpactStart, stages: Sequence[ImpactStage]) -> Blow:
+        def thrown(start: ImpactStart, stages: Sequence[ImpactStage]) -> ImpulseOutcome:
             left = energy
             for begun, share in (*((stage.start, stage.share) for stage in stages), (start, 0.0)):
                 mobility, opens = self._mobility(t, begun.state, contacts)
@@ -327,15 +327,15 @@ class Collisions:
                 gives = share * impulses
                 left -= float(gives @ (opens + mobility.W @ gives / 2))
             further = complementary(mobility.W, np.maximum(opens, 0.0) + mobility.W @ impulses)
-            return _blow(start.state, mobility, impulses if further is None else impulses + further)
+            return _outcome(start.state, mobility, impulses if further is None else impulses + further)
 
-        return self._impulses.stages(t, self._impulses.begins(compression[-1].blow.after, t), thrown)
+        return self._impulses.stages(t, self._impulses.begins(compression[-1].outcome.after, t), thrown)
 
     def _returned(self, t: float, contacts: Sequence[Contact], stages: Sequence[ImpactStage], back: Array) -> float:
         """Energy in J that comes back by shares (contacts,) of all impulses, the last first, if all answers as then."""
         energy, opens = 0.0, np.zeros(len(contacts))
-        for start, blow, share in reversed(stages):
-            impulses = back * share * blow.pressed
+        for start, outcome, share in reversed(stages):
+            impulses = back * share * outcome.pressed
             gains = self._mobility(t, start.state, contacts)[0].W @ impulses
             energy += float(impulses @ (opens + gains / 2))
             opens += gains
@@ -344,9 +344,9 @@ class Collisions:
     def _taken(self, t: float, contacts: Sequence[Contact], stages: Sequence[ImpactStage]) -> Array:
         """(contacts,) energy in J that contacts take up: their impulses at the mean of their closing speeds."""
         taken = np.zeros(len(contacts))
-        for start, blow, share in stages:
-            began, ends = (opens_at(t, one, contacts) for one in (start.state, blow.after))
-            taken -= share * blow.pressed * (np.array(began) + share / 2 * np.subtract(ends, began))
+        for start, outcome, share in stages:
+            began, ends = (opens_at(t, one, contacts) for one in (start.state, outcome.after))
+            taken -= share * outcome.pressed * (np.array(began) + share / 2 * np.subtract(ends, began))
         # what opens before others close it comes late, and gives nothing: the sum alone is physics
         least = np.maximum(taken, 0.0)
         return least * (taken.sum() / least.sum()) if least.any() else taken
@@ -358,7 +358,7 @@ class Collisions:
         return self._impulses.begins(self._transfer.with_stored(loose, t, state.stored(t)), t)
 
     def _rubbing(self, modes: ModeNames) -> dict[int, GivesWay]:
-        """Elements that hold by torques limited on both sides, with the modes to which these lead."""
+        """Machines that hold by torques limited on both sides, with the modes to which these lead."""
         return {k: sides for k, sides in limited(self._machines, modes).items() if len(sides) > 1}
 
     def _slipping(self, t: float, before: ModeNames, after: HybridState, least: float) -> dict[int, str]:
@@ -377,15 +377,15 @@ class Collisions:
         return mobility, np.where(mobility.has_inertia, opens_at(t, state, contacts), 0.0)
 
 
-def _blow(state: HybridState, mobility: Mobility, impulses: Array) -> Blow:
+def _outcome(state: HybridState, mobility: Mobility, impulses: Array) -> ImpulseOutcome:
     """What impulses (contacts,) lead to."""
     after = state._replace(x=mobility.moved(state.x, impulses))
-    return Blow(after, after.regime, impulses, mobility.through(impulses))
+    return ImpulseOutcome(after, after.regime, impulses, mobility.through(impulses))
 
 
 def _pressed(stages: Sequence[ImpactStage]) -> Array:
     """(contacts,) the impulses of all stages."""
-    return np.asarray(sum(stage.share * stage.blow.pressed for stage in stages))
+    return np.asarray(sum(stage.share * stage.outcome.pressed for stage in stages))
 
 
 def _of_energy(energy: float, shares: Array, opens: Array, W: Array) -> Array:

@@ -10,10 +10,10 @@ from shaftwork.components.branches import INTEGRAL
 from shaftwork.components.modes import Leave, Mode
 from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.hybrid.consistency import CLEAR
-from shaftwork.hybrid.hybrid_state import Change, HybridState, Transition, differences
+from shaftwork.hybrid.hybrid_state import EventOutcome, HybridState, Transition, differences
 from shaftwork.hybrid.hybrid_transfer import HybridTransfer
 from shaftwork.hybrid.impacts.collisions import Collisions, in_turn, opens_at, touching
-from shaftwork.hybrid.impacts.impulses import Blow, ImpactStage, Impulses
+from shaftwork.hybrid.impacts.impulses import ImpactStage, ImpulseOutcome, Impulses
 from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, ActiveGuard, ModeNames, limited, with_modes
 
 
@@ -32,9 +32,9 @@ class Impacts:
         self.gears = self._impulses.gears
 
     def meets(self, state: HybridState, t: float, to: Mode, number: int) -> float:
-        """The speed across a machine that is joined from now on; zero where it is no more than an error of the run."""
+        """The speed across a machine that is rigid from now on; zero where it is no more than an error of the run."""
         regime = state.regime
-        if not self._machines[number].joins(to.name) or to.form == regime.mode(number).form:
+        if not self._machines[number].is_rigid(to.name) or to.form == regime.mode(number).form:
             return 0.0
         speed = state.across(number, t)
         least = NO_IMPACT * max(1.0, state.top_speed)
@@ -43,71 +43,71 @@ class Impacts:
         if abs(speed) <= least or abs(speed) <= abs(speed - before):
             return 0.0
         try:
-            joined = self._transfer.to_modes(state, t, with_modes(regime.modes, {number: to.name}))
+            rigid = self._transfer.to_modes(state, t, with_modes(regime.modes, {number: to.name}))
         except NetworkError:
             return speed
         # between dampers alone a speed is whatever their torques make it: joining them stops no inertia
-        return speed if state.differs(joined, t, least) else 0.0
+        return speed if state.differs(rigid, t, least) else 0.0
 
     def hit(
-        self, t: float, after: float, state: HybridState, ended: ActiveGuard
-    ) -> tuple[HybridState, list[Change], float]:
+        self, t: float, after: float, state: HybridState, crossed: ActiveGuard
+    ) -> tuple[HybridState, list[Transition], float]:
         """An impact; what hits stays where a rebound would lose less than it gains, as it is found late by rounding.
 
         It is thrown back where it has passed its limit, and how long ago, in s, is said: what it would gain between
         there and here would add up over many rebounds.
         """
         late = 0.0
-        if ended.leave.rebound is not None:
-            ended = self._fastest(after, state, ended)
-            late = _late(after, state, ended)
-        new, changes = self._collided(t, after, state.moved(after, -late), ended.machine, ended.leave)
-        if changes[0].rebound and self._is_last(after, state, new, ended):
-            stays = replace(ended.leave, rebound=None)
-            return *self._collided(t, after, state, ended.machine, stays), 0.0
-        return new, changes, late
+        if crossed.leave.rebound is not None:
+            crossed = self._fastest(after, state, crossed)
+            late = _late(after, state, crossed)
+        new, transitions = self._collided(t, after, state.moved(after, -late), crossed.machine, crossed.leave)
+        if transitions[0].rebound and self._is_last(after, state, new, crossed):
+            stays = replace(crossed.leave, rebound=None)
+            return *self._collided(t, after, state, crossed.machine, stays), 0.0
+        return new, transitions, late
 
-    def _fastest(self, t: float, state: HybridState, ended: ActiveGuard) -> ActiveGuard:
+    def _fastest(self, t: float, state: HybridState, crossed: ActiveGuard) -> ActiveGuard:
         """Of what is hit at an instant in s the guard of what closes fastest: impacts follow each other."""
-        contacts = [*touching(t, state, ended.machine, ended.leave)]
+        contacts = [*touching(t, state, crossed.machine, crossed.leave)]
         contacts = contacts if self._together else in_turn(t, state, contacts)
         thrown = [c for c, opens in zip(contacts, opens_at(t, state, contacts), strict=True) if c.share_back(opens)]
-        if not thrown or any(contact.number == ended.machine for contact in thrown):
-            return ended
+        if not thrown or any(contact.number == crossed.machine for contact in thrown):
+            return crossed
         contact = thrown[0]
         return next(active for active in state.regime.watched if active.leave is contact.leave)
 
-    def _collided(self, t: float, after: float, state: HybridState, number: int, leave: Leave) -> Transition:
+    def _collided(self, t: float, after: float, state: HybridState, number: int, leave: Leave) -> EventOutcome:
         """An impact of all contacts that touch: each is joined, or for an instant where it is thrown back."""
         regime = state.regime
         collision = self._collisions.impact(after, state, number, leave)
-        new, hits = collision.after, list[Change]()
+        new, hits = collision.after, list[Transition]()
         contacts = sorted((*collision.stays, *collision.thrown), key=lambda contact: contact.number != number)
         for contact in contacts:
             rebound = contact in collision.thrown
             energies = {} if hits else {"given": collision.given, "lost": collision.lost}
             machine = self._machines[contact.number]
-            hits.append(Change(t, machine, contact.apart, contact.joined, rebound, impact=True, **energies))
+            hits.append(Transition(t, machine, contact.apart, contact.joined, rebound, impact=True, **energies))
             if not rebound and contact.leave is not None:
                 new = self._at_limit(new, contact.number, contact.leave)
         new = self._staying(after, regime.modes, new)
         besides = {contact.number for contact in contacts}
-        changes = [*hits, *differences(t, self._machines, regime.modes, new.regime.modes, besides)]
+        transitions = [*hits, *differences(t, self._machines, regime.modes, new.regime.modes, besides)]
         self._refuse_gain(after, state, new, hits[0])
-        return new, changes
+        return new, transitions
 
-    def _is_last(self, t: float, state: HybridState, new: HybridState, ended: ActiveGuard) -> bool:
+    def _is_last(self, t: float, state: HybridState, new: HybridState, crossed: ActiveGuard) -> bool:
         """Whether a rebound would lose less than it gains, as it is found late by rounding.
 
         Args:
             t: s.
             state: what was before.
             new: after it, with gears in the modes in which they have passed it on.
-            ended: the guard of what hits.
+            crossed: the guard of what hits.
         """
-        number = ended.machine
-        share, speed = state.regime.constant(number, ended.leave.rebound), state.across(number, t)
-        late = ended.side * state.course(t)[3][ended.guard]
+        number = crossed.machine
+        share, speed = state.regime.constant(number, crossed.leave.rebound), state.across(number, t)
+        late = crossed.side * state.course(t)[3][crossed.guard]
         # gears that have not turned round go on as they were
         before = state.regime.modes
         same = {k: before[k] for k in self.gears if state.across(k, t) * new.across(k, t) >= 0}
@@ -152,7 +152,7 @@ class Impacts:
             speed, later = (slope * one.across(k, t) for one in (state, state.moved(t, 1.0)))
             if speed**2 < 4 * (later - speed) * CLEAR * bands[active.guard]:
                 closed[k] = before[k]
-        return self._collisions.joined(t, self._impulses.begins(state, t), closed)[-1].blow.after if closed else state
+        return self._collisions.join(t, self._impulses.begins(state, t), closed)[-1].outcome.after if closed else state
 
     @staticmethod
     def _at_limit(state: HybridState, number: int, leave: Leave) -> HybridState:
@@ -164,7 +164,7 @@ class Impacts:
         x[place], _ = state.regime.twist_limit(number, leave)
         return state._replace(x=x)
 
-    def _refuse_gain(self, t: float, state: HybridState, new: HybridState, hits: Change) -> None:
+    def _refuse_gain(self, t: float, state: HybridState, new: HybridState, hits: Transition) -> None:
         """Refuse an impact that would leave more energy than there was.
 
         Raises:
@@ -181,7 +181,7 @@ class Impacts:
 
     def jumped(
         self, t: float, state: HybridState, before: float, after: float
-    ) -> tuple[HybridState, list[Change], Impact]:
+    ) -> tuple[HybridState, list[Transition], Impact]:
         """After a source has jumped that is rigidly joined to inertias; what it gives then, and what gears lose.
 
         What holds by a limited torque takes no speed along at once, and contacts are pressed, not pulled.
@@ -194,7 +194,7 @@ class Impacts:
         """
         regime, begins = state.regime, self._impulses.begins(state, before)
         new = state._replace(x=regime.bound.impulse(state.x, before, after))
-        stages: tuple[ImpactStage, ...] = (ImpactStage(begins, Blow(new, regime), 1.0),)
+        stages: tuple[ImpactStage, ...] = (ImpactStage(begins, ImpulseOutcome(new, regime), 1.0),)
         # where springs alone take the jump up no impulse passes, and rounding would tell the way of it through gears
         stored = new.stored(after)
         passes = any(abs(v - begins.stored[name]) > NO_IMPACT * max(abs(v), 1.0) for name, v in stored.items())
@@ -209,5 +209,5 @@ def _late(t: float, state: HybridState, met: ActiveGuard) -> float:
     """How long ago, in s, a guard passed through zero along a straight line."""
     regime, here = state.regime, state.course(t)
     step, beyond = regime.ahead(here[2]), met.side * here[3][met.guard]
-    gain = met.side * regime.limits(*regime.later(here, step))[met.guard] - beyond
+    gain = met.side * regime.guards_at(*regime.later(here, step))[met.guard] - beyond
     return beyond * step / gain if 0 < beyond < gain else 0.0

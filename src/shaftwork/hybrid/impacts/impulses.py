@@ -26,13 +26,11 @@ from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import ModeNames, with_modes
 from shaftwork.numerics.tolerances import EPS
 
-MOST_STAGES = 100
-"""So many times gears may come to rest in one impact."""
 NOTHING_OF = ROUNDINGS * EPS
 """What rounding leaves of speeds and impulses, as part of the largest."""
 
 
-class Blow(NamedTuple):
+class ImpulseOutcome(NamedTuple):
     """What an impulse leads to.
 
     Args:
@@ -61,7 +59,7 @@ class ImpactStage(NamedTuple):
     """A part of an impact in which speeds change in proportion: from where, to what, and how much of that."""
 
     start: ImpactStart
-    blow: Blow
+    outcome: ImpulseOutcome
     share: float
 
 
@@ -75,7 +73,7 @@ class Impulses:
     def __init__(self, transfer: HybridTransfer) -> None:
         self._transfer, self._machines = transfer, transfer.machines
         self.gears = tuple(k for k, machine in enumerate(self._machines) if machine.modes.passes_on)
-        """Elements that pass torques on by their direction."""
+        """Machines that pass torques on by their direction."""
 
     def begins(self, state: HybridState, t: float) -> ImpactStart:
         """Where an impact begins, with the inputs of a time in s."""
@@ -83,26 +81,32 @@ class Impulses:
         return ImpactStart(state, t, state.stored(t), speeds)
 
     def stages(
-        self, t: float, start: ImpactStart, blow: Callable[[ImpactStart, Sequence[ImpactStage]], Blow]
+        self,
+        t: float,
+        start: ImpactStart,
+        impulse: Callable[[ImpactStart, Sequence[ImpactStage]], ImpulseOutcome],
+        most: int = 100,
     ) -> tuple[ImpactStage, ...]:
         """All parts of an impulse, of which the last leads to its end.
 
         Args:
             t: time after it in s at which inputs are read.
             start: before it.
-            blow: the rest of it from a start on, all in the modes that gears have there, and after what stages.
+            impulse: to what the rest of it leads from a start on, all in the modes that gears have there, and after
+                what stages.
+            most: so many times gears may come to rest in it.
 
         Raises:
             SimulationError: gears come to rest again and again.
         """
         stages: list[ImpactStage] = []
-        while len(stages) < MOST_STAGES:
-            start, rest = self._consistent(t, start, lambda begun: blow(begun, stages))
-            share, number = min(self._coming_to_rest(t, start, rest.after), default=(1.0, -1))
-            stages.append(ImpactStage(start, rest, share))
+        while len(stages) < most:
+            start, outcome = self._consistent(t, start, lambda begun: impulse(begun, stages))
+            share, number = min(self._coming_to_rest(t, start, outcome.after), default=(1.0, -1))
+            stages.append(ImpactStage(start, outcome, share))
             if number < 0:
                 return tuple(stages)
-            modes = self._at_rest(rest.after.regime.modes, number)
+            modes = self._at_rest(outcome.after.regime.modes, number)
             start = self._reached(t, stages[-1], modes, number)
         raise SimulationError(
             f"'{self._machines[number].name}' comes to rest again and again in one impact at t = {t:.9g} s. Give the "
@@ -111,12 +115,10 @@ class Impulses:
 
     def _reached(self, t: float, stage: ImpactStage, modes: ModeNames, number: int) -> ImpactStart:
         """The end of a stage, at which a gear is at rest, in the modes that go on."""
-        start, blow, share = stage
-        stored = {
-            name: value + share * gain
-            for (name, value), gain in zip(start.stored.items(), self._gained(t, start, blow).values(), strict=True)
-        }
-        speeds = {k: v + share * (blow.after.across(k, t) - v) for k, v in start.speeds.items()}
+        start, outcome, share = stage
+        gained = self._gained(t, start, outcome)
+        stored = {name: value + share * gained[name] for name, value in start.stored.items()}
+        speeds = {k: v + share * (outcome.after.across(k, t) - v) for k, v in start.speeds.items()}
         return ImpactStart(self._transfer.with_stored(modes, t, stored), t, stored, {**speeds, number: 0.0})
 
     def _in_modes(self, t: float, start: ImpactStart, modes: ModeNames) -> ImpactStart:
@@ -126,40 +128,40 @@ class Impulses:
         return self.begins(new.state, t) if any(start.speeds[k] for k in halted) else new
 
     def _consistent(
-        self, t: float, start: ImpactStart, blow: Callable[[ImpactStart], Blow]
-    ) -> tuple[ImpactStart, Blow]:
+        self, t: float, start: ImpactStart, impulse: Callable[[ImpactStart], ImpulseOutcome]
+    ) -> tuple[ImpactStart, ImpulseOutcome]:
         """The modes of gears in which an impulse passes as they say; a gear that turns, and has none, jams at once."""
-        rest, jammed, seen = self._passed(start, blow), set[int](), {start.state.regime.modes}
+        outcome, jammed, seen = self._passed(start, impulse), set[int](), {start.state.regime.modes}
         while True:
-            if rest is None or rest.after is start.state:
-                start, rest = self._released(t, start, blow) or (start, rest or blow(start))
-            turn = self._turned(t, start, rest)
+            if outcome is None or outcome.after is start.state:
+                start, outcome = self._released(t, start, impulse) or (start, outcome or impulse(start))
+            turn = self._turned(t, start, outcome)
             if turn is None:
-                return start, rest
+                return start, outcome
             number, to = turn
             modes = self._led(start.state.regime.modes, number, to)
             if modes in seen:
                 if number in jammed:
-                    return start, rest
+                    return start, outcome
                 jammed.add(number)
                 seen.clear()
                 modes = self._at_rest(modes, number)
             start = self._in_modes(t, start, modes)
-            rest = self._passed(start, blow)
+            outcome = self._passed(start, impulse)
             seen.add(modes)
 
-    def _passed(self, start: ImpactStart, blow: Callable[[ImpactStart], Blow]) -> Blow | None:
+    def _passed(self, start: ImpactStart, impulse: Callable[[ImpactStart], ImpulseOutcome]) -> ImpulseOutcome | None:
         """What an impulse leads to; None where the equations of a gear at rest contradict what it meets."""
         try:
-            return blow(start)
+            return impulse(start)
         except NetworkError:
             if not self._stopped(start.state):
                 raise
             return None
 
     def _released(
-        self, t: float, start: ImpactStart, blow: Callable[[ImpactStart], Blow]
-    ) -> tuple[ImpactStart, Blow] | None:
+        self, t: float, start: ImpactStart, impulse: Callable[[ImpactStart], ImpulseOutcome]
+    ) -> tuple[ImpactStart, ImpulseOutcome] | None:
         """Where gears at rest and what they meet hold each other, no impulse tells its way: which gear it turns.
 
         It is one of which the modes say so as well.
@@ -169,24 +171,24 @@ class Impulses:
             options = (with_modes(start.state.regime.modes, {k: name}) for name in turning)
             for modes in filter(self._transfer.possible, options):
                 here = self._in_modes(t, start, modes)
-                rest = self._passed(here, blow)
-                if rest is None or rest.after is here.state:
+                outcome = self._passed(here, impulse)
+                if outcome is None or outcome.after is here.state:
                     continue
-                turned = self._turned(t, here, rest)
+                turned = self._turned(t, here, outcome)
                 if turned is None or turned[0] != k:
-                    return here, rest
+                    return here, outcome
         return None
 
     def _stopped(self, state: HybridState) -> list[int]:
         """Gears in a mode of rest."""
         return [k for k in self.gears if not _turns(state.regime.mode(k))]
 
-    def _turned(self, t: float, start: ImpactStart, rest: Blow) -> tuple[int, str] | None:
+    def _turned(self, t: float, start: ImpactStart, outcome: ImpulseOutcome) -> tuple[int, str] | None:
         """The gear that an impulse brings out of its mode at once, and the mode that follows."""
         if not self.gears:
             return None
-        equations, p = rest.passing.equations, rest.passing.p
-        impulses = self._impulses(t, start, rest)
+        equations, p = outcome.passing.equations, outcome.passing.p
+        impulses = self._impulses(t, start, outcome)
         # a gear elsewhere has the rounding of what moves there, however small the impact is
         momentum = equations.stores.momentum(equations.bound(p), start.stored)
         least = NOTHING_OF * max(np.abs(impulses).max(initial=0.0), momentum)
@@ -197,7 +199,7 @@ class Impulses:
             if leave.by_torque
         ]
         exceeded = [turn for turn in exceeded if turn[0] > least]
-        turning = (turn for turn in self._stopping(t, start, rest.after) if turn[0] >= 0)
+        turning = (turn for turn in self._stopping(t, start, outcome.after) if turn[0] >= 0)
         exceeded = exceeded or [(ends, k, to) for _, ends, k, to in turning]
         return max(exceeded)[1:] if exceeded else None
 
@@ -227,9 +229,9 @@ class Impulses:
         names = (to, *(leave.to for leave in self._machines[number].modes[to].leaves if leave.to != modes[number]))
         return next(filter(self._transfer.possible, (with_modes(modes, {number: name}) for name in names)), modes)
 
-    def _gained(self, t: float, start: ImpactStart, blow: Blow) -> dict[str, float]:
+    def _gained(self, t: float, start: ImpactStart, outcome: ImpulseOutcome) -> dict[str, float]:
         """What all that is stored gains by the whole of an impulse."""
-        then = blow.after.stored(t)
+        then = outcome.after.stored(t)
         return {name: then[name] - value for name, value in start.stored.items()}
 
     def given(self, t: float, stages: Sequence[ImpactStage], before: float | None = None) -> dict[str, float]:
@@ -242,14 +244,14 @@ class Impulses:
         """
         energies, jumped = list[Mapping[str, float]](), 0.0
         for stage in stages:
-            equations, p = stage.blow.passing.equations, stage.blow.passing.p
-            bound, stores, gained = equations.bound(p), equations.stores, self._gained(t, stage.start, stage.blow)
+            equations, p = stage.outcome.passing.equations, stage.outcome.passing.p
+            bound, stores, gained = equations.bound(p), equations.stores, self._gained(t, stage.start, stage.outcome)
             then = jumped + stage.share * (1.0 - jumped)
             late = 1.0 if before is None else (jumped + then) / 2
             for time, weight in ((t, late), (before, 1.0 - late)):
                 if time is None:
                     continue
-                whole = stores.given(bound, bound.sources(time), gained, stage.blow.through)
+                whole = stores.given(bound, bound.sources(time), gained, stage.outcome.through)
                 energies.append({part: stage.share * weight * energy for part, energy in whole.items()})
             jumped = then
         return summed(energies)
@@ -258,21 +260,21 @@ class Impulses:
         """What gears lose in an impulse, in J by part: what passes through the mesh at the mean of the speeds there."""
         energies: list[Mapping[str, float]] = []
         for stage in stages if self.gears else ():
-            impulses = self._impulses(t, stage.start, stage.blow)
+            impulses = self._impulses(t, stage.start, stage.outcome)
             for k, began in stage.start.speeds.items():
-                name, passing = self._machines[k].part.name, stage.blow.passing.equations
-                ends = stage.blow.after.across(k, t)
-                state, time, speed = (stage.blow.after, t, ends) if ends else (*stage.start[:2], began)
+                name, passing = self._machines[k].part.name, stage.outcome.passing.equations
+                ends = stage.outcome.after.across(k, t)
+                state, time, speed = (stage.outcome.after, t, ends) if ends else (*stage.start[:2], began)
                 # the speeds of a mesh are in proportion to that of its gear
                 mean = (began + stage.share / 2 * (ends - began)) / speed if speed else 0.0
                 pairs = zip(_meshes(passing, name), _across_meshes(state, time, name), strict=True)
                 energies += [{name: float(sum(stage.share * impulses[mesh] * mean * across for mesh, across in pairs))}]
         return summed(energies)
 
-    def _impulses(self, t: float, start: ImpactStart, blow: Blow) -> Array:
+    def _impulses(self, t: float, start: ImpactStart, outcome: ImpulseOutcome) -> Array:
         """(branches,) what passes through every branch at once."""
-        equations, p = blow.passing.equations, blow.passing.p
-        return equations.stores.impulses(equations.bound(p), self._gained(t, start, blow)) + blow.through
+        equations, p = outcome.passing.equations, outcome.passing.p
+        return equations.stores.impulses(equations.bound(p), self._gained(t, start, outcome)) + outcome.through
 
 
 def summed(energies: Iterable[Mapping[str, float]]) -> dict[str, float]:

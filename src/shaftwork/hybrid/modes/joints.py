@@ -33,12 +33,8 @@ from shaftwork.codegen.array_form.matrices import LinearPart
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.formulation.explicit_rows import Rows
 from shaftwork.formulation.form import StateForm
+from shaftwork.network.graph import GROUND
 from shaftwork.numerics.tolerances import SAME
-
-LARGEST_GROUP = 8
-"""States that such laws may connect: each of their rows has as many terms. With 15, rows take twenty times as long to
-compile as matrices, and run slower."""
-FRAME = -1
 
 Entries = dict[tuple[int, int], Symbol]
 """Symbols in place of the entries of a matrix, by row and column."""
@@ -54,18 +50,18 @@ class HeldRows:
     """
 
     def __init__(self, rows: Rows, laws: Sequence[tuple[int, set[int]]], groups: Iterable[Collection[int]]) -> None:
-        self.joins: Entries = {}
+        self.projection: Entries = {}
         """P, by places of states."""
         self.reactions: Entries = {}
         """R, by branch and place of a state."""
         rates, through = [*rows.rates], dict(rows.through)
         for group in map(sorted, groups):
             for place in group:
-                rates[place] = _product(self.joins, "joins", place, group, rows.rates)
+                rates[place] = _product(self.projection, "projection", place, group, rows.rates)
             for law, places in laws:
                 if not places.isdisjoint(group):
                     through[law] += _product(self.reactions, "reaction", law, group, rows.rates)
-        self.symbols = (*self.joins.values(), *self.reactions.values())
+        self.symbols = (*self.projection.values(), *self.reactions.values())
         """Parameters of the rows behind those of the network."""
         parameters = (*rows.parameters, *self.symbols)
         self.rows = replace(rows, parameters=parameters, rates=tuple(rates), through=through)
@@ -83,28 +79,32 @@ def held_places(form: StateForm, link: int) -> set[int]:
     return {place for place, tree in enumerate(form.across_states) if tree in members}
 
 
-def groups(form: StateForm, laws: Iterable[int], others: Iterable[Collection[int]]) -> list[set[int]] | None:
+def groups(
+    form: StateForm, laws: Iterable[int], others: Iterable[Collection[int]], largest: int = 8
+) -> list[set[int]] | None:
     """The states that laws connect, or None where rows are not the place for what holds.
 
     They are where no machine rests because others hold both of its ends: as a rule, each holds inertias of its own. Who
-    carries would be another question, which an equations of its own answers.
+    carries would be another question, which equations of their own answer.
 
     Args:
         form: of the equations in which nothing holds.
         laws: branches of what may hold.
         others: places of states between which something else may become rigid.
+        largest: so many states may be connected: each of their rows has as many terms. With 15, rows take twenty times
+            as long to compile as matrices, and run slower.
     """
     graph = nx.Graph()
     for link in laws:
         places = held_places(form, link)
-        ends = (*places, FRAME)[:2]
+        ends = (*places, GROUND)[:2]
         if not 0 < len(places) <= 2 or graph.has_edge(*ends):
             return None
         graph.add_edge(*ends)
-    sets = [set(group) for group in nx.connected_components(graph.subgraph([n for n in graph if n != FRAME]))]
+    sets = [set(group) for group in nx.connected_components(graph.subgraph([n for n in graph if n != GROUND]))]
     rigid = (*others, *(held_places(form, link) for link in form.dependent_across))
     taken = set[int]().union(*rigid)
-    if not nx.is_forest(graph) or any(len(group) > LARGEST_GROUP or not taken.isdisjoint(group) for group in sets):
+    if not nx.is_forest(graph) or any(len(group) > largest or not taken.isdisjoint(group) for group in sets):
         return None
     return sets
 
@@ -131,42 +131,38 @@ class Joints:
         """Whether each of them holds inertias that the others do not."""
         if followers is None or not self.independent:
             return
-        reactions, alike = _reactions(G, B), _alike(followers, size)
-        self._B, self._reactions, self._alike = Factor(B), Factor(reactions), Factor(alike)
-        self._joined = sparse.csr_array(alike @ (sparse.eye_array(size, format="csr") + B @ reactions))
+        reactions, as_one = _reactions(G, B), _as_one(followers, size)
+        self._B, self._reactions, self._as_one = Factor(B), Factor(reactions), Factor(as_one)
+        self._projection = sparse.csr_array(as_one @ (sparse.eye_array(size, format="csr") + B @ reactions))
         self._part = part
 
     @cached_property
     def moving(self) -> LinearPart:
         """The equations with what holds moving as one, to which its own laws add nothing; explicit rows need none."""
-        part, joined, alike = self._part, self._joined, self._alike.sparse
+        part, P, as_one = self._part, self._projection, self._as_one.sparse
         others = sparse.diags_array(np.where(np.isin(np.arange(part.B.shape[1]), self.places), 0.0, 1.0))
-        return replace(part, A=joined @ part.A, B=joined @ part.B @ others, B1=joined @ part.B1, C=part.C @ alike)
+        return replace(part, A=P @ part.A, B=P @ part.B @ others, B1=P @ part.B1, C=part.C @ as_one)
 
     def reactions(self, rates: Array) -> Array:
         """(h,) or (h, k): what cancels rates (n,) or (n, k) in the speeds across."""
         return self._reactions @ rates
 
-    def alike(self, x: Array) -> Array:
+    def as_one(self, x: Array) -> Array:
         """States or rates in which what is held follows the others to the last bit."""
-        return self._alike @ x
+        return self._as_one @ x
 
     def entries(self, rows: HeldRows) -> Array:
         """(k,) the numbers of the symbols in rows: those of P and of R."""
         number = {branch: k for k, branch in enumerate(self._branches)}
-        entries = np.zeros(len(rows.symbols))
-        entries[: len(rows.joins)] = _at(self._joined, [*rows.joins])
-        reactions = [
-            (k, (number[branch], place)) for k, (branch, place) in enumerate(rows.reactions) if branch in number
-        ]
-        entries[[len(rows.joins) + k for k, _ in reactions]] = _at(
-            self._reactions.sparse, [place for _, place in reactions]
-        )
+        entries, first = np.zeros(len(rows.symbols)), len(rows.projection)
+        entries[:first] = _at(self._projection, [*rows.projection])
+        places = {k: (number[one], place) for k, (one, place) in enumerate(rows.reactions, first) if one in number}
+        entries[[*places]] = _at(self._reactions.sparse, [*places.values()])
         return entries
 
     def met(self, x: Array) -> Array:
-        """(n,) the states after an inelastic impact that joins what is held: every momentum is kept."""
-        return self.alike(x + self._B @ self.reactions(x))
+        """(n,) the states after an inelastic impact of what is held: every momentum is kept."""
+        return self.as_one(x + self._B @ self.reactions(x))
 
 
 def _at(matrix: Any, places: Sequence[tuple[int, int]]) -> Array:
@@ -184,7 +180,7 @@ def _reactions(G: Any, B: Any) -> Any:
     return sparse.csr_array((solved.data, (solved.row, met[solved.col])), shape=G.shape)
 
 
-def _alike(followers: Mapping[int, Mapping[int, float]], size: int) -> Any:
+def _as_one(followers: Mapping[int, Mapping[int, float]], size: int) -> Any:
     """(n, n) sparse: each follower from the states that it follows, the others as they are."""
     entries = [(1.0, place, place) for place in range(size) if place not in followers]
     entries += [(gain, place, column) for place, row in followers.items() for column, gain in row.items()]
@@ -249,7 +245,7 @@ class HeldArrays(BoundArrays):
 
     def rates(self, t: Any, x: Array, y: Array, u: Array) -> Array:
         """x', in which what is held moves as one."""
-        return self.joints.alike(super().rates(t, x, y, u))
+        return self.joints.as_one(super().rates(t, x, y, u))
 
     def rhs(self, t: Any, x: Array) -> Array:
         """x' at time t."""

@@ -38,20 +38,13 @@ from shaftwork.pipeline.prepared import Prepared
 
 KEPT = 64
 """Parameter vectors whose matrices are kept."""
-SAMPLES = 64
-"""Times at which a guard is looked at to know its size."""
-SOON, MORE = 1e-9, 1e3
-"""What changes within this part of a phase by more than its largest value over this is nothing but rounding."""
 CLOCK = 1e-20
 """What a clock counts: heyoka's tolerance is relative to the largest state, which this must never be."""
-
-FEW_CALLS = 50
-"""Calls of a right-hand side that are not worth code of its own."""
 
 RightSide = Callable[[float, Array], Array]
 GuardValues = Callable[[Array, Array], Array]
 Motion = Callable[[float, list[float]], tuple[list[float], list[float]]]
-Limits = Callable[[float, list[float]], list[float]]
+GuardsAt = Callable[[float, list[float]], list[float]]
 Near = Callable[[float, list[float], float, Moves, float], tuple[list[float], list[float], list[float]]]
 
 
@@ -84,7 +77,8 @@ class ModeEquations:
         self.parts = {part.name: part for part in model.form.graph.parts}
         mode_guards = ModeGuards(model.form, machines, forms, readings)
         self.resting, self.watched, self.sides = mode_guards.resting, mode_guards.watched, mode_guards.sides
-        self._expressions, self._owners = mode_guards.expressions, mode_guards.owners
+        self.expressions, self._owners = mode_guards.expressions, mode_guards.owners
+        """The guards in states, parameters and time; the machine of each."""
         self._shown = MachineReadings(machines, self.parts, readings, self._parameters)
         if rows is None:
             _ = self._shown.function  # so that all quantities are known before any function of them is made
@@ -103,7 +97,7 @@ class ModeEquations:
         """The rates of what arrives by waves and of its rates."""
         return []
 
-    def taking(self, t: float, stored: Mapping[str, float], p: Array) -> Array:
+    def states_from(self, t: float, stored: Mapping[str, float], p: Array) -> Array:
         """The states with which the equations take up what was stored, with the inputs of a time in s."""
         return self.stores.states(self.bound(p), t, stored)
 
@@ -111,14 +105,9 @@ class ModeEquations:
         """Whether a machine holds and gives way in these equations, by other numbers in explicit rows."""
         return False
 
-    def taking_over(self, x: Array, p: Array) -> Array | None:  # noqa: ARG002
+    def states_held(self, x: Array, p: Array) -> Array | None:  # noqa: ARG002
         """The states of other numbers in the same rows, or None where an impact leads there."""
         return x
-
-    @property
-    def guards_shown(self) -> tuple[Expr, ...]:
-        """The guards in states, parameters and time."""
-        return tuple(self._expressions)
 
     @property
     def clocks(self) -> tuple[int, ...]:
@@ -129,7 +118,7 @@ class ModeEquations:
     def timed(self) -> tuple[int, ...]:
         """Guards that change with time by themselves, and not along straight pieces alone, or where no state moves."""
         every = not self.model.states
-        return tuple(k for k, guard in enumerate(self._expressions) if every or pieces_degree(guard) is None)
+        return tuple(k for k, guard in enumerate(self.expressions) if every or pieces_degree(guard) is None)
 
     def vector(self, base: Mapping[str, float], numbers: Mapping[str, float]) -> Array:
         """The parameter vector with the given values and numbers of modes."""
@@ -161,7 +150,7 @@ class ModeEquations:
         read, parameters = self._read(p), self.values(p).tolist()
 
         def guards(times: Array, states: Array) -> Array:
-            values = np.empty((len(self._expressions), len(times)))
+            values = np.empty((len(self.expressions), len(times)))
             with np.errstate(all="ignore"):
                 for row, value in enumerate(self._many(times, *read(times, states), *parameters)):
                     values[row] = value
@@ -171,7 +160,7 @@ class ModeEquations:
 
     @cached_property
     def _many(self) -> Callable[..., Any]:
-        return vectorised_list((TIME, *self._readings.symbols, *self._parameters), self._expressions)
+        return vectorised_list((TIME, *self._readings.symbols, *self._parameters), self.expressions)
 
     def _read(self, p: Array) -> Callable[[Array, Array], Array]:
         """What guards are made of at times (k,) and states (k, n): the states, or quantities that follow from them."""
@@ -284,7 +273,7 @@ class ModeEquations:
         """The first time at which a law or a guard has no value in some branch, and which one."""
         law, symbols = rough(self.bound(p), times, states), (TIME, *self._readings.symbols, *self._parameters)
         for active in () if law is not None else self.watched(modes):
-            function = vectorised(symbols, self._expressions[active.guard])
+            function = vectorised(symbols, self.expressions[active.guard])
             quantities = np.array([*self._read(p)(times, states)]).reshape(-1, times.size)
             for time, values in zip(times, quantities.T, strict=True):
                 if is_rough(function, (time, *values, *self.values(p))):
@@ -295,8 +284,8 @@ class ModeEquations:
         """The right-hand side and what engines find out about it, for all phases with these parameters."""
         return self._rates_by_p(p.tobytes(), lambda: (self._right_side(p), {}))
 
-    def _right_side(self, p: Array) -> RightSide:
-        """In scalar code where there is some: that of `motion`, until it is asked for often enough to have its own."""
+    def _right_side(self, p: Array, few_calls: int = 50) -> RightSide:
+        """In scalar code where there is some: that of `motion`, as a few calls are not worth code of their own."""
         scalar = self.whole.scalar
         if scalar is None:
             return self.bound(p).rhs
@@ -304,7 +293,7 @@ class ModeEquations:
         scalar_rates = cache(lambda: scalar.bind(values))
 
         def rates(t: float, x: Array) -> Array:
-            if next(calls) < FEW_CALLS:
+            if next(calls) < few_calls:
                 return np.array(motion(t, x.tolist())[0])
             return scalar_rates()(t, x)
 
@@ -315,38 +304,56 @@ class ModeEquations:
         """The right-hand side in scalar code, where there are rows."""
         return self.model.scalar
 
-    def clock_sizes(self, span: tuple[float, float], x: Array, p: Array) -> Array:
-        """(clocks,) the size of each clock over a phase, as far as the time alone tells."""
+    def clock_sizes(
+        self,
+        span: tuple[float, float],
+        x: Array,
+        p: Array,
+        *,
+        samples: int = 64,
+        soon: float = 1e-9,
+        most: float = 1e-3,
+    ) -> Array:
+        """(clocks,) the size of each clock over a phase, as far as the time alone tells.
+
+        Args:
+            span: start and end of the phase, s.
+            x: (n,) its states.
+            p: parameters.
+            samples: times at which guards are looked at.
+            soon: what changes within this part of the phase by more than
+            most: this part of its largest value, is nothing but rounding.
+        """
         if not self.clocks:
             return np.empty(0)
         length = span[1] - span[0]
-        times = np.linspace(span[0], span[1] - SOON * length, SAMPLES)
-        pairs = np.concatenate([times, times + SOON * length])
+        times = np.linspace(span[0], span[1] - soon * length, samples)
+        pairs = np.concatenate([times, times + soon * length])
         values = self.guards(p)(pairs, np.tile(x, (pairs.size, 1)))[:, list(self.clocks)]
-        largest, changes = np.abs(values).max(axis=0), np.abs(values[:SAMPLES] - values[SAMPLES:]).max(axis=0)
+        largest, changes = np.abs(values).max(axis=0), np.abs(values[:samples] - values[samples:]).max(axis=0)
         # what is another number at once is rounding, and an engine that followed it would not get on
-        return CLOCK * np.where(largest > MORE * changes, largest, 1.0) * length
+        return CLOCK * np.where(changes < most * largest, largest, 1.0) * length
 
-    def motion(self, p: Array) -> tuple[Motion, Limits, Near]:
+    def motion(self, p: Array) -> tuple[Motion, GuardsAt, Near]:
         """Rates and guards together, guards alone, and guards `around` an instant, from a time in s and states."""
         if self._rows is not None:
             return self.whole.motions(self.values(p).tolist())
         bound, guards = self.bound(p), self.guards(p)
 
-        def limits(t: float, x: list[float]) -> list[float]:
+        def guards_at(t: float, x: list[float]) -> list[float]:
             return guards(np.array([t]), np.array([x]))[0].tolist()  # type: ignore[no-any-return]
 
         def motion(t: float, x: list[float]) -> tuple[list[float], list[float]]:
-            return [*bound.rhs(t, np.array(x)).tolist(), *self.arriving_rates(x)], limits(t, x)
+            return [*bound.rhs(t, np.array(x)).tolist(), *self.arriving_rates(x)], guards_at(t, x)
 
-        return motion, limits, partial(around, motion, limits)
+        return motion, guards_at, partial(around, motion, guards_at)
 
     @cached_property
-    def motions(self) -> Callable[[list[float]], tuple[Motion, Limits, Near]]:
+    def motions(self) -> Callable[[list[float]], tuple[Motion, GuardsAt, Near]]:
         """What makes `motion` of the values of all parameters."""
         rows = self._rows
         assert rows is not None  # noqa: S101 (asked only then)
-        return bindable({"t": TIME, "x": rows.states}, {"p": rows.parameters}, rows.rates, self._expressions)
+        return bindable({"t": TIME, "x": rows.states}, {"p": rows.parameters}, rows.rates, self.expressions)
 
     def sizes(self, p: Array) -> list[float]:
         """The nominal size of each state."""
@@ -365,9 +372,9 @@ class ModeEquations:
         from shaftwork.codegen.taylor.heyoka import build
 
         states = (*rows.states, *(Symbol(f"clock {k}", real=True) for k in self.clocks))
-        rates = (*rows.rates, *(CLOCK * self._expressions[k] for k in self.clocks))
+        rates = (*rows.rates, *(CLOCK * self.expressions[k] for k in self.clocks))
         changing = [*(rows.parameters[place] for place in self._numbers), *rows.parameters[len(self._places) :]]
         try:
-            return build(states, TIME, rows.parameters, rates, tuple(self._expressions), changing)
+            return build(states, TIME, rows.parameters, rates, tuple(self.expressions), changing)
         except CompileError:
             return None

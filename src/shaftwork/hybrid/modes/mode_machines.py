@@ -26,7 +26,7 @@ from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import Netlist
 
 NO_IMPACT = 1e-8
-"""A speed across what is joined, as part of the largest one or of one, up to which it is an error of the run."""
+"""A speed across what is rigid, as part of the largest one or of one, up to which it is an error of the run."""
 
 ModeNames = tuple[str, ...]
 """The mode of every mode machine of a network, in their order."""
@@ -61,17 +61,17 @@ class ModeMachine:
 
     @property
     def first(self) -> str:
-        """Its first mode, in which it joins nothing rigidly."""
+        """Its first mode, in which it is not rigid."""
         return self.modes.options[0].name
 
-    def joins(self, mode: str) -> bool:
-        """Whether it joins its ends rigidly in a mode."""
+    def is_rigid(self, mode: str) -> bool:
+        """Whether it joins its ends in a mode, so that they move as one."""
         return self.modes[mode].form != self.modes.options[0].form
 
     @cached_property
-    def joined(self) -> tuple[str, ...]:
-        """The modes in which it joins its ends rigidly."""
-        return tuple(mode.name for mode in self.modes.options if self.joins(mode.name))
+    def rigid_modes(self) -> tuple[str, ...]:
+        """The modes in which it joins its ends."""
+        return tuple(mode.name for mode in self.modes.options if self.is_rigid(mode.name))
 
     @cached_property
     def equivalent(self) -> Mapping[str, str]:
@@ -82,18 +82,18 @@ class ModeMachine:
     def opening_side(self, mode: str) -> float | None:
         """The side of the speed across at which a mode opens that joins by a torque of one sign; None of others."""
         sides = [side for side, _ in self.modes[mode].gives_way]
-        return sides[0] if len(sides) == 1 and self.joins(mode) else None
+        return sides[0] if len(sides) == 1 and self.is_rigid(mode) else None
 
     @cached_property
     def is_one_way(self) -> bool:
         """Whether it is a diode or a freewheel: it joins by a torque of one sign, as soon as speeds let it."""
-        return not self._rebounds and any(self.opening_side(mode) is not None for mode in self.joined)
+        return not self._rebounds and any(self.opening_side(mode) is not None for mode in self.rigid_modes)
 
     @cached_property
     def is_switch(self) -> bool:
         """Whether it joins its ends whatever passes: a time or a law says when it does."""
-        limited = any(self.modes[mode].gives_way for mode in self.joined)
-        return bool(self.joined) and not self.modes.passes_on and not limited
+        limited = any(self.modes[mode].gives_way for mode in self.rigid_modes)
+        return bool(self.rigid_modes) and not self.modes.passes_on and not limited
 
     @cached_property
     def holds(self) -> bool:
@@ -102,10 +102,10 @@ class ModeMachine:
         Freewheels and diodes have no branch while they are open, in whose place a reaction could act.
         """
         options = self.modes.options
-        limited = all(self.modes[mode].gives_way for mode in self.joined)
+        limited = all(self.modes[mode].gives_way for mode in self.rigid_modes)
         one_law = all(mode.at_rest is None for mode in options)
         reacts = self._rebounds or len(options) > 2
-        return bool(self.joined) and limited and one_law and reacts and not self.modes.passes_on
+        return bool(self.rigid_modes) and limited and one_law and reacts and not self.modes.passes_on
 
     @property
     def _rebounds(self) -> bool:
@@ -120,7 +120,7 @@ def machines_of(graph: CircuitGraph) -> tuple[ModeMachine, ...]:
 
 
 def limited(machines: Sequence[ModeMachine], modes: ModeNames) -> dict[int, GivesWay]:
-    """Elements that join by a torque that is limited, with the sides on which it is and the modes there."""
+    """Machines that join by a torque that is limited, with the sides on which it is and the modes there."""
     pairs = enumerate(zip(machines, modes, strict=True))
     sides = {k: machine.modes[name].gives_way for k, (machine, name) in pairs}
     return {k: gives_way for k, gives_way in sides.items() if gives_way}
@@ -228,14 +228,14 @@ class ModeGuards:
         self.expressions: list[Expr] = []
         """Each guard once."""
         self.resting = {k for k, e in enumerate(machines) if rests(form, self._parts[e.part.name], e.modes)}
-        """Elements of which others hold both ends."""
+        """Machines of which others hold both ends."""
         self._places: dict[tuple[int, Expr], int] = {}
         self._leaves: dict[tuple[int, str], tuple[ActiveGuard, ...]] = {}
         for number, machine in enumerate(machines):
             part = self._parts[machine.part.name]
             for mode in machine.modes.options:
                 if forms[number] in (None, mode.form):
-                    holds = forms[number] is None and machine.joins(mode.name)
+                    holds = forms[number] is None and machine.is_rigid(mode.name)
                     still = {ACROSS: Integer(0)} if holds or number in self.resting else {}
                     self._leaves[number, mode.name] = tuple(self._leaving(number, part, mode, still))
         self.owners = {active.guard: active.machine for guards in self._leaves.values() for active in guards}

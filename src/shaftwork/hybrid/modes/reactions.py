@@ -35,8 +35,6 @@ from shaftwork.pipeline.model import Model
 
 MANY = 12
 """From so many machines on that hold and slip matrices are quicker than equations for each combination that is met."""
-KEPT_RATES = 2
-"""Parameter vectors whose right-hand sides are kept in one combination of what holds."""
 
 
 class ReactionEquations(ModeEquations):
@@ -59,25 +57,26 @@ class ReactionEquations(ModeEquations):
         self._joining = [self._places[number] for number in joining if number in self._places]
         self._joints: tuple[LinearPart, Joints] | None = None
         self._notes: dict[bytes, dict[str, Any]] = {}
-        self._holds: tuple[Joints, Array] | None = None
+        self._entries_of: tuple[Joints, Array] | None = None
         _ = self._many, self.clocks  # made once for all
 
     def holding(self, numbers: tuple[int, ...]) -> ReactionEquations:
         """The equations in which the machines of these numbers hold."""
         other = copy(self)
-        caches: dict[str, Any] = {name: BoundedCache(KEPT_RATES) for name in ("_guards_by_p", "_rates_by_p")}
+        # of each combination of what holds, few: there may be many of these
+        caches: dict[str, Any] = {name: BoundedCache(2) for name in ("_guards_by_p", "_rates_by_p")}
         laws = [law for k in numbers if (law := self._laws[k]) is not None]
-        vars(other).update(_holding_laws=laws, _joints=None, _holds=None, **caches)
+        vars(other).update(_holding_laws=laws, _joints=None, _entries_of=None, **caches)
         return other
 
     def holds_by_numbers(self, number: int) -> bool:
         """Whether a machine holds and gives way by other numbers in explicit rows."""
         return self._entries is not None and self._laws[number] is not None
 
-    def taking_over(self, x: Array, p: Array) -> Array | None:
+    def states_held(self, x: Array, p: Array) -> Array | None:
         """The states in which all comes to one speed that holds, or None where an impact leads there."""
-        joined = self.joints(p).met(x)
-        return joined if is_same(joined, x) else None
+        met = self.joints(p).met(x)
+        return met if is_same(met, x) else None
 
     def suits(self, engine: str) -> bool:
         """Whether what holds is numbers in explicit rows, and these are quick for an engine by name.
@@ -87,7 +86,7 @@ class ReactionEquations(ModeEquations):
         """
         if self._entries is None or not self.clocks:
             return self._entries is not None
-        noisy = any(isinstance(part, HeldNoise | SmoothNoise) for part in parts(self._expressions))
+        noisy = any(isinstance(part, HeldNoise | SmoothNoise) for part in parts(self.expressions))
         return engine in ("auto", "heyoka") and not noisy and self.program is not None
 
     @cached_property
@@ -100,9 +99,9 @@ class ReactionEquations(ModeEquations):
         if self._entries is None:
             return p
         joints = self.joints(p)
-        if self._holds is None or self._holds[0] is not joints:
-            self._holds = joints, joints.entries(self._entries)
-        return np.concatenate([p, self._holds[1]])
+        if self._entries_of is None or self._entries_of[0] is not joints:
+            self._entries_of = joints, joints.entries(self._entries)
+        return np.concatenate([p, self._entries_of[1]])
 
     def joints(self, p: Array) -> Joints:
         """What holds, for parameters; the last is kept."""
@@ -122,7 +121,7 @@ class ReactionEquations(ModeEquations):
     def _reading(self, bound: HeldArrays, matrices: ReadingMatrices) -> Callable[[Array, Array], Array]:
         """What guards are made of; rounding gives no speed to what holds."""
         exact = super()._reading(bound, matrices)
-        return lambda times, states: exact(times, bound.joints.alike(states.T).T)
+        return lambda times, states: exact(times, bound.joints.as_one(states.T).T)
 
     def bound(self, p: Array) -> HeldArrays:
         """The equations with their parameters."""
@@ -141,7 +140,7 @@ def laws_that_hold(model: Model, machines: Sequence[ModeMachine]) -> list[int | 
     """Of each machine that holds the branch of the law in whose place a reaction does so; None for others.
 
     Args:
-        model: equations in which none of them joins anything.
+        model: equations in which none of them is rigid.
         machines: of the network.
 
     Returns:
@@ -162,20 +161,20 @@ def _entries(model: Model, machines: Sequence[ModeMachine], laws: Sequence[int |
     links = [law for _, law in pairs]
     if not all(_vanishes(model.form, *pair) for pair in pairs):
         return None
-    rigid = (machine for machine, law in zip(machines, laws, strict=True) if law is None and machine.joined)
+    rigid = (machine for machine, law in zip(machines, laws, strict=True) if law is None and machine.rigid_modes)
     others = [_places(model.form, machine) for machine in rigid]
-    joined = groups(model.form, links, others)
-    rows = None if joined is None else model.rows_of(len(others) + 1)
-    if joined is None or rows is None:
+    connected = groups(model.form, links, others)
+    rows = None if connected is None else model.rows_of(len(others) + 1)
+    if connected is None or rows is None:
         return None
-    return HeldRows(rows, [(link, held_places(model.form, link)) for link in links], joined)
+    return HeldRows(rows, [(link, held_places(model.form, link)) for link in links], connected)
 
 
 def _vanishes(form: StateForm, machine: ModeMachine, law: int) -> bool:
     """Whether a law is zero in all modes in which a machine holds."""
     template = form.graph.branches[law].template
     numbers = [symbol for symbol in template.symbols if symbol.name == machine.modes.symbol]
-    values = (Float(machine.modes[mode].value) for mode in machine.joined)
+    values = (Float(machine.modes[mode].value) for mode in machine.rigid_modes)
     return all(template.law.xreplace(dict.fromkeys(numbers, value)) == 0 for value in values)
 
 

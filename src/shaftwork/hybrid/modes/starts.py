@@ -25,9 +25,6 @@ from shaftwork.formulation.observables import Observables
 from shaftwork.hybrid.modes.mode_machines import ModeMachine, ModeNames
 from shaftwork.network.graph import GraphPart
 
-SPEEDS = 256
-"""Speeds across machines that are kept with values of the parameters."""
-
 
 class MachineReadings:
     """What machines show at one instant: the speed across each, its twist, and what its start conditions read.
@@ -53,7 +50,7 @@ class MachineReadings:
         # of each machine the place where what it shows begins
         self._firsts = tuple(accumulate((2 + len(symbols) for symbols in self._symbols), initial=0))
         self._speeds: dict[int, Callable[..., Any]] = {}
-        self._bound = BoundedCache[tuple[int, bytes], Callable[..., Any]](SPEEDS)
+        self._bound = BoundedCache[tuple[int, bytes], Callable[..., Any]](256)
 
     def first_modes(self, t: float, read: Sequence[float], p: Array) -> ModeNames:
         """The mode of each machine in which a motion starts, in the equations in which nothing is joined by a mode."""
@@ -81,10 +78,10 @@ class MachineReadings:
     def _start(self, number: int, besides: str, t: float, shown: Sequence[Any]) -> str:
         modes = self._machines[number].modes
         first, symbols = self._firsts[number], self._symbols[number]
-        holds = starts_of(modes, symbols)(t, *shown[first : first + 2 + len(symbols)])
-        if holds is None:
+        conditions = starts_of(modes, symbols)(t, *shown[first : first + 2 + len(symbols)])
+        if conditions is None:
             raise no_value(t, in_words(self._machines[number].part, Tuple(*(mode.starts for mode in modes.options))))
-        pairs = zip(modes.options, holds, strict=True)
+        pairs = zip(modes.options, conditions, strict=True)
         return next((mode.name for mode, is_true in pairs if is_true and mode.name != besides), "")
 
     @cached_property

@@ -47,7 +47,7 @@ class TaylorRun:
         """The guard that ended the run."""
         self._begun: tuple[float, Array] | None = None
         """Time in s and state at the last guard past which it went on."""
-        self.reactions: list[tuple[float, Callable[[], Rates]]] = []
+        self.resets: list[tuple[float, Callable[[], Rates]]] = []
         """Times in s of guards past which it went on, and what makes the equations that hold from there on."""
 
     def piece(self, piece: SmoothInterval, advance: Advance) -> None:
@@ -71,7 +71,7 @@ class TaylorRun:
         watch = self._watch(piece)
         self.lent.listeners.clear()
         longest = self._first_step(piece)
-        self.lent.listeners[:] = [self._reacts] if watch is None else []
+        self.lent.listeners[:] = [self._goes_on] if watch is None else []
         while True:
             left = self.problem.max_steps - self.steps
             raw, outcome, steps = advance(integrator, watch, left if longest == math.inf else 1, longest)
@@ -85,7 +85,7 @@ class TaylorRun:
                     settle(self.program, integrator, piece.end - piece.start)
                 continue
             # a switch may be at zero where a guard is met, and settling it takes a step: it is not passed at once
-            if self.met is not None and watch is not None and self._reacts(self.met):
+            if self.met is not None and watch is not None and self._goes_on(self.met):
                 self.met = None
                 integrator.reset_cooldowns()
                 settle(self.program, integrator, piece.end - integrator.time)
@@ -96,8 +96,8 @@ class TaylorRun:
         self.state = integrator.state.copy()
         if not np.isfinite(self.state).all():
             raise self._failure(piece, "err_nf_state", watch)
-        if self.problem.react is not None:
-            self.problem.react.refuse_missed(self.met, integrator.time, self.state)
+        if self.problem.past_guards is not None:
+            self.problem.past_guards.refuse_missed(self.met, integrator.time, self.state)
 
     def _guard(self, ends: Sequence[tuple[int, float]], offsets: Sequence[float]) -> None:
         """Watch the guards that end the phase from here on, by their numbers and sides, and no others.
@@ -137,20 +137,20 @@ class TaylorRun:
         values = self.program.guard_values(time, state, self.integrator.pars)
         return np.where(self._sides == 0.0, -np.inf, self._sides * values - self._offsets)
 
-    def _reacts(self, met: int) -> bool:
+    def _goes_on(self, met: int) -> bool:
         """Whether the run goes on past the guard that it has met."""
-        if self.problem.react is None:
+        if self.problem.past_guards is None:
             return False
         time = self.integrator.time
-        reaction = self.problem.react(len(self.reactions), met, time, self._x)
-        if reaction is None:
+        reset = self.problem.past_guards(len(self.resets), met, time, self._x)
+        if reset is None:
             return False
-        self.reactions.append((time, reaction.equations))
-        self._p[: reaction.p.size] = reaction.p
-        if reaction.x is not None:
-            self._x[: reaction.x.size] = reaction.x
+        self.resets.append((time, reset.equations))
+        self._p[: reset.p.size] = reset.p
+        if reset.x is not None:
+            self._x[: reset.x.size] = reset.x
         self._begun = time, self._x.copy()
-        self._guard(reaction.ends, reaction.offsets)
+        self._guard(reset.ends, reset.offsets)
         self.program.weigh(self.integrator)
         return True
 
@@ -187,11 +187,11 @@ class TaylorRun:
             return
         # near a root of zero slope a series is poor in steps so short that it moves nothing
         sizes = np.max([np.abs(segment.tcs[:, :, 0]).max(axis=0) for segment in segments], axis=0)
-        changes, rhs, past = [time for time, _ in self.reactions], self.problem.rhs, 0
+        changes, rhs, past = [time for time, _ in self.resets], self.problem.rhs, 0
         for segment in segments:
             for (start, end), terms in zip(pairwise(segment.times), segment.tcs, strict=True):
                 if (now := bisect_right(changes, start)) > past:
-                    rhs, past = self.reactions[now - 1][1](), now
+                    rhs, past = self.resets[now - 1][1](), now
                 for part in self._inside:
                     if not _satisfied(self.problem, rhs, piece, terms, start, part * (end - start), sizes):
                         reason = f"up to t = {end:.9g} s a law has a root or a pole that a Taylor series does not show"
