@@ -144,12 +144,7 @@ class Model(CompiledModel):
         """
         refuse_unrecorded(self.form, as_names(angles))
         values = self._checked_all(parameters)
-        if isinstance(initial, Solution):
-            initial = ending_of(initial, self.form.graph)
-        if isinstance(initial, Ending):
-            t_start = time_of_start(t_start, initial)
-        elif isinstance(initial, Mapping):
-            initial = dict(initial)  # that of the caller may change
+        initial, t_start = self._start(initial, t_start)
         if self._changes_structure(values):
             options: dict[str, Any] = {"t_start": t_start, "rtol": rtol, "atol": atol, "t_eval": t_eval}
             options |= {"engine": engine, "initial": initial, "max_steps": max_steps, "progress": progress}
@@ -164,6 +159,16 @@ class Model(CompiledModel):
         taken = demand.engine if motion.phases else motion.engine
         again = Repetition(self._rebuild, self.netlist, demand, taken, values, initial, self)
         return replace(motion, parameters=parameters, initial=dict(initial or {}), rtol=demand.rtol, again=again)
+
+    def _start(
+        self, initial: Mapping[str, float] | Solution | None, t_start: float | None
+    ) -> tuple[Given, float | None]:
+        """Start values or the end of the motion before, and the time of it."""
+        if isinstance(initial, Solution):
+            initial = ending_of(initial, self.form.graph)
+        if isinstance(initial, Ending):
+            return initial, time_of_start(t_start, initial)
+        return None if initial is None else dict(initial), t_start  # that of the caller may change
 
     def _motion(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
         prepared = self.prepare(self.vector(values) if values else self.defaults)
