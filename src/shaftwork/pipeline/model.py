@@ -168,7 +168,7 @@ class Model(CompiledModel):
             initial = ending_of(initial, self.form.graph)
         if isinstance(initial, Ending):
             return initial, time_of_start(t_start, initial)
-        return None if initial is None else dict(initial), t_start  # that of the caller may change
+        return (dict(initial) if isinstance(initial, Mapping) else initial), t_start  # that of the caller may change
 
     def _motion(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
         prepared = self.prepare(self.vector(values) if values else self.defaults)
