@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from shaftwork.components.excitations import Harmonics, HarmonicTorque
+from shaftwork.components.excitations import HarmonicTorque
+from shaftwork.components.harmonics import Harmonics
 from shaftwork.components.sources import TorqueSource
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si

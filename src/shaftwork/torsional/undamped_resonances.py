@@ -1,0 +1,70 @@
+"""Resonances that nothing damps, in words: which they are, which shafts lack damping, and what to give them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+from shaftwork.components.mechanics import Spring
+from shaftwork.components.shafts import Shaft
+from shaftwork.core.parameters import in_si
+from shaftwork.network.netlist import first_few, listed
+from shaftwork.results.observer import RPM
+
+if TYPE_CHECKING:
+    from shaftwork.pipeline.network import Network
+    from shaftwork.torsional.forced_train import Resonance
+
+
+def undamped_note(resonances: Sequence[Resonance], net: Network, shafts: Iterable[str]) -> str:
+    """Which resonances have no bound, and how damping is given; empty where there are none.
+
+    Args:
+        resonances: that nothing damps.
+        net: the train.
+        shafts: names of its springs and shafts.
+    """
+    if not resonances:
+        return ""
+    modes: dict[str, list[Resonance]] = {}
+    for one in resonances:
+        modes.setdefault(one.mode, []).append(one)
+    where = "; ".join(
+        f"{mode} ({several[0].frequency:.5g} Hz) at "
+        + first_few([f"{one.speed * RPM:.5g} 1/min in order {one.order:g}" for one in several], separator=", ")
+        for mode, several in modes.items()
+    )
+    return (
+        f"Nothing damps these resonances, so torques have no bound there: {where}. {_remedy(resonances, net, shafts)}"
+    )
+
+
+def _remedy(resonances: Sequence[Resonance], net: Network, shafts: Iterable[str]) -> str:
+    parts = {part.name: part for part in net.parts}
+    bare = [name for name in shafts if not _is_damped(parts[name])]
+    if not bare:
+        return "The dampers do not move in these modes: add one where the mode swings."
+    frequency = resonances[0].frequency
+    example = _example(parts[bare[0]], 0.01 / (2 * math.pi * frequency))
+    return (
+        f"Without damping: {listed(tuple(bare))}. Give d= to a Spring, damping= to a Shaft, or add a Damper. A loss "
+        f"factor of 1 % at {frequency:.5g} Hz, for example, is {example}."
+    )
+
+
+def _example(part: object, share: float) -> str:
+    """The damping of a part that is so many s of its stiffness."""
+    match part:
+        case Spring(name=str(name), c=float() | int() as stiffness):
+            return f"d = {share * stiffness:.3g} N m s/rad for '{name}'"
+        case Shaft(name=str(name)):
+            diameters = in_si("diameter", part.diameter, "m"), in_si("bore", part.inner_diameter, "m")
+            modulus = in_si("shear_modulus", part.shear_modulus, "Pa")
+            stiffness = modulus * math.pi * (diameters[0] ** 4 - diameters[1] ** 4) / 32
+            return f"damping = {share * stiffness:.3g} N m^2 s/rad for '{name}'"
+    return f"d = {share:.3g} s times its stiffness"
+
+
+def _is_damped(part: object) -> bool:
+    return bool(part.d if isinstance(part, Spring) else part.damping if isinstance(part, Shaft) else True)
