@@ -64,23 +64,29 @@ def torsional(subject: Subject) -> str:
         return ""
     judged = [name for name, shaft in calculation.items() if shaft.limits is not None]
     subject.figures["torsional"] = calculation.plot(*judged)
-    rows = [
-        tuple(in_text(cell).replace(r"$\mathrm{tau\_c}$", r"$\tau_c$") for cell in row) for row in calculation.table
-    ]
-    heads = ("Shaft", "Torque in kN m", "at 1/min", "Order", r"Stress in N/mm$^2$", r"$\tau_c$", "Verdict")
-    barred = [f"{shaft.shaft}: {one}" for shaft in calculation.values() for one in shaft.barred]
+    rows = [tuple(map(_limits_in_print, row)) for row in calculation.table]
+    heads = tuple(_limits_in_print(head[:1].upper() + head[1:]) for head in calculation.heads)
     rule = (
-        "The torque is half of peak to peak over a cycle, from all orders with their phases. Stresses are nominal; "
-        "permitted ones are those of IACS UR M68."
+        "Each row is at the speed that governs the shaft: that of the largest stress over tau_c or, without a limit, of "
+        "the largest torque. Torques and stresses are half of peak to peak over a cycle, from all orders with their "
+        "phases. Stresses are nominal; permitted ones are those of IACS UR M68."
     )
     return paragraphs(
-        in_text(f"{calculation.heading}. {rule}"),
-        columns(heads, rows, (4, 2.5, 2.5, 1.6, 2.5, 2, 4)),
-        listed(barred),
+        _limits_in_print(f"{calculation.heading}. {rule}"),
+        columns(heads, rows, (3, *(1.5 for _ in heads[2:]), 4)),
+        listed(calculation.notes),
         picture("torsional", "Vibratory stress or torque over the speed, with the permitted stresses"),
         *map(_holzer, calculation.modes[:HOLZER_MODES]),
         _heat(calculation),
     )
+
+
+def _limits_in_print(cell: str) -> str:
+    """A cell of the table with the letters of the rule as formulas."""
+    text = in_text(cell.replace("N/mm^2", "SQUARE"))
+    for limit in ("c", "t"):
+        text = text.replace(rf"$\mathrm{{tau\_{limit}}}$", rf"$\tau_{limit}$")
+    return text.replace("SQUARE", "N/mm$^2$")
 
 
 def _holzer(mode: Any) -> str:
@@ -100,10 +106,8 @@ def _holzer(mode: Any) -> str:
 
 def _heat(calculation: Any) -> str:
     """What parts turn into heat, at the speed at which each does most."""
-    most = {part: float(power.max()) for part, power in calculation.power_lost.items()}
-    least = 1e-6 * max(most.values(), default=0.0)  # the rest is rounding
-    rows = [(breakable(part), number(power)) for part, power in most.items() if power > least]
-    return columns(("Heat of the vibration in", "W, at most"), rows, (3, 2))
+    rows = [(breakable(part), number(power), number(speed * 30 / math.pi)) for part, power, speed in calculation.heat]
+    return columns(("Heat of the vibration in", "W, at most", "at 1/min"), rows, (3, 2, 2))
 
 
 def shaft_models(subject: Subject) -> str:
