@@ -19,8 +19,8 @@ from shaftwork.core.parameters import in_si, parameter
 class HarmonicTorque(Component):
     """A torque that swings with the angle of its shaft, given to node a and taken from node b where it has one.
 
-    Law: tau = mean + scale sum_k A_k cos(k (phi - phi_f) + psi_k), positive raises the speed of a, with phi the angle
-    of a relative to b and A, psi the harmonics. A cylinder of an engine is one, with its firing angle phi_f; so is a
+    Law: tau = mean + scale sum_k T_k cos(k (phi - alpha) + psi_k), positive raises the speed of a, with phi the angle
+    of a relative to b and T, psi the harmonics. A cylinder of an engine is one, with its firing angle alpha; so is a
     propeller. A simulation reads the angle as it swings. Linear analyses have it at one angle, which `modes` and
     `campbell` warn of; `torsional_calculation` takes the mean for the train, and the swing, at the angle of a shaft
     that turns steadily, as its excitation. Analogue: a current source.

@@ -29,13 +29,13 @@ rounding before order 60 for any rod longer than the stroke."""
 class Harmonics:
     """The swing of a torque over the turns of its shaft: an amplitude and a phase for each order.
 
-    Law: sum_k A_k cos(k phi + psi_k), times (|omega| / omega_n)^exponent where an exponent is given.
+    Law: sum_k T_k cos(k phi + psi_k), times (|omega| / omega_n)^exponent where an exponent is given.
 
     Args:
         orders: (k,) swings per turn, above 0; a four-stroke cylinder has 0.5, 1, 1.5, ...
-        amplitudes: (k,) A in N m; with `speeds` (n, k).
+        amplitudes: (k,) T in N m; with `speeds` (n, k).
         phases: psi in rad, of the same shape; 0 by default.
-        speeds: (n,) ascending speeds in rad/s at which the rows hold. Between them A cos(psi) and A sin(psi) are
+        speeds: (n,) ascending speeds in rad/s at which the rows hold. Between them T cos(psi) and T sin(psi) are
             linear, beyond them constant.
         exponent: 2 for the torque of a propeller or of reciprocating masses; 0 by default.
         omega_n: the speed in rad/s at which the amplitudes hold, where there is an exponent.
@@ -195,7 +195,7 @@ class Harmonics:
         return cls(orders, tuple((size * parts).tolist()), exponent=2.0, omega_n=omega_n)
 
     def at(self, omega: Any) -> NDArray[Any]:
-        """Complex amplitudes A exp(i psi) in N m at speeds of the shaft in rad/s: (k,) at one, (n, k) at several."""
+        """Complex amplitudes T exp(i psi) in N m at speeds of the shaft in rad/s: (k,) at one, (n, k) at several."""
         speed = np.abs(np.asarray(omega, dtype=float))
         parts = np.asarray(self.amplitudes) * np.exp(1j * np.asarray(self.phases))
         if self.speeds:
