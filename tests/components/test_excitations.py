@@ -134,8 +134,8 @@ def test_equal_cylinders_print_one_sum_each_and_one_table() -> None:
         net.add(sw.HarmonicTorque(f"cylinder {number}", harmonics=HARMONICS, firing_angle=angle), "a")
     printed = net.equations().latex()
     assert printed.count(r"\sum_{k} T_{k} \, \cos") == 3
-    assert printed.count(r"T_{k} & 30 & 20 & 10") == 1
-    assert printed.count(r"\psi_{k} & 0.3 & -0.4 & 2") == 1
+    assert printed.count(r"\\ 30 & 20 & 10") == 1
+    assert printed.count(r"\\ 0.3 & -0.4 & 2") == 1
     assert r"\alpha_{\mathrm{cylinder},3}" in printed  # where the cycle begins, by its letter
     assert "varphi_{f" not in printed
     assert r"those of cylinder 1, cylinder 2 and cylinder 3." in printed
@@ -156,7 +156,7 @@ def test_torques_with_other_orders_have_letters_of_their_own_and_say_at_which_sp
     assert r"\left(\frac{\omega_{1}}{12.5}\right)^{2} \, \sum_{k} T_{\mathrm{B}, k}" in printed
     assert r"the amplitudes at $12.5\,\mathrm{rad/s}$" in printed
     assert r"T_{\mathrm{C}, k}(|\omega_{1}|)" in printed
-    assert r"T_{\mathrm{C}, k}(20\,\mathrm{rad/s}) & 20 & 6" in printed
+    assert r"T_{\mathrm{C}, k}(20\,\mathrm{rad/s})" in printed
 
 
 def test_many_equal_cylinders_are_one_row_whose_index_is_not_that_of_the_orders() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -67,8 +67,7 @@ class HarmonicTables:
         for table, marked in self.marked.items():
             harmonics = table.harmonics
             for first in range(0, len(harmonics.orders), most):
-                there = slice(first, first + most)
-                yield Line("", (_array(marked, there),), relation="")
+                yield from _lines(marked, slice(first, first + most))
 
     def helpers(self) -> Iterator[Cells]:
         """Rows of a nomenclature: the letters of the tables."""
@@ -85,17 +84,23 @@ def _letters(number: int) -> str:
     return (_letters(before - 1) if before else "") + chr(ord("A") + last)
 
 
-def _array(table: HarmonicTable, there: slice) -> str:
-    """Orders, amplitudes and phases in columns; with a table over the speed, rows for each."""
-    harmonics, (amplitude, phase) = table.harmonics, table.letters
-    orders = harmonics.orders[there]
-    rows = [("k", orders)]
-    if harmonics.speeds:
-        for speed, sizes, turns in zip(harmonics.speeds, harmonics.amplitudes, harmonics.phases, strict=True):
-            at = rf"({printed_number(speed)}\,\mathrm{{rad/s}})"
-            rows += [(amplitude + at, sizes[there]), (phase + at, turns[there])]
-    else:
-        rows += [(amplitude, harmonics.amplitudes[there]), (phase, harmonics.phases[there])]
+def _lines(table: HarmonicTable, there: slice) -> Iterator[Line]:
+    """Some orders in columns, above their amplitudes and phases; at each speed where there are several."""
+    harmonics, letters = table.harmonics, table.letters
+    sizes, turns = harmonics.amplitudes, harmonics.phases
+    if not harmonics.speeds:
+        yield _line(letters, (harmonics.orders[there], sizes[there], turns[there]))
+        return
+    for speed, *rows in zip(harmonics.speeds, sizes, turns, strict=True):
+        at = rf"({printed_number(speed)}\,\mathrm{{rad/s}})"
+        yield _line([letter + at for letter in letters], (harmonics.orders[there], *(row[there] for row in rows)))
+
+
+def _line(letters: Iterable[str], rows: Iterable[Sequence[float]]) -> Line:
     digits = 5  # more than any torque of a cylinder is known to
-    lines = (" & ".join((head, *(printed_number(value, digits) for value in values))) for head, values in rows)
-    return rf"\begin{{array}}{{l{'r' * len(orders)}}} " + r" \\ ".join(lines) + r" \end{array}"
+    values = (" & ".join(printed_number(value, digits) for value in row) for row in rows)
+    return Line(_matrix(("k", *letters)), (_matrix(values),))
+
+
+def _matrix(rows: Iterable[str]) -> str:
+    return r"\begin{bmatrix} " + r" \\ ".join(rows) + r" \end{bmatrix}"

@@ -65,28 +65,37 @@ def torsional(subject: Subject) -> str:
     judged = [name for name, shaft in calculation.items() if shaft.limits is not None]
     subject.figures["torsional"] = calculation.plot(*judged)
     rows = [tuple(map(_limits_in_print, row)) for row in calculation.table]
-    heads = tuple(_limits_in_print(head[:1].upper() + head[1:]) for head in calculation.heads)
+    heads = tuple(
+        _limits_in_print(head if head.startswith("tau_") else head[:1].upper() + head[1:]) for head in calculation.heads
+    )
     rule = (
-        "Each row is at the speed that governs the shaft: that of the largest stress over tau_c or, without a limit, of "
-        "the largest torque. Torques and stresses are half of peak to peak over a cycle, from all orders with their "
+        "Each row is at the speed that governs the shaft: of the largest stress over tau_c or, without a limit, of the "
+        "largest torque. Torques and stresses are half of peak to peak over a cycle, from all orders with their "
         "phases. Stresses are nominal; permitted ones are those of IACS UR M68."
     )
     return paragraphs(
         _limits_in_print(f"{calculation.heading}. {rule}"),
         columns(heads, rows, (3, *(1.5 for _ in heads[2:]), 4)),
-        listed(calculation.notes),
+        _with_letters(listed(tuple(map(_with_squares, calculation.notes)))),
         picture("torsional", "Vibratory stress or torque over the speed, with the permitted stresses"),
         *map(_holzer, calculation.modes[:HOLZER_MODES]),
         _heat(calculation),
     )
 
 
-def _limits_in_print(cell: str) -> str:
-    """A cell of the table with the letters of the rule as formulas."""
-    text = in_text(cell.replace("N/mm^2", "SQUARE"))
+def _limits_in_print(text: str) -> str:
+    """A text of the calculation with the letters of the rule as formulas."""
+    return _with_letters(in_text(_with_squares(text)))
+
+
+def _with_squares(text: str) -> str:
+    return text.replace("mm^2", "mm²")
+
+
+def _with_letters(latex: str) -> str:
     for limit in ("c", "t"):
-        text = text.replace(rf"$\mathrm{{tau\_{limit}}}$", rf"$\tau_{limit}$")
-    return text.replace("SQUARE", "N/mm$^2$")
+        latex = latex.replace(rf"$\mathrm{{tau\_{limit}}}$", rf"$\tau_{limit}$")
+    return latex
 
 
 def _holzer(mode: Any) -> str:

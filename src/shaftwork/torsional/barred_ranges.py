@@ -41,7 +41,8 @@ class BarredRange:
 
     def __str__(self) -> str:
         about = ", ".join(f"{speed * RPM:.5g}" for speed in self.critical)
-        verdict = "to be barred and passed quickly" if self.allowed else "NOT permitted"
+        why = "above tau_t" if self.share > 1 else f"up to {TRANSIENT:g} of the rated speed or more"
+        verdict = "to be barred and passed quickly" if self.allowed else f"NOT permitted, as it is {why}"
         size = f"{self.stress / MPA:.4g} N/mm^2, {100 * self.share:.4g} % of tau_t"
         return (
             f"{self.start * RPM:.5g} to {self.end * RPM:.5g} 1/min (critical {about}): {verdict}, "

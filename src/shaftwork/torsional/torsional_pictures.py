@@ -53,6 +53,9 @@ def _draw(axis: Axes, shaft: ShaftVibration) -> None:
             limit = _shown(values / MPA)
             axis.plot(n, limit, style, color="0.3", linewidth=1.2, label=label)
             top = max(top, float(np.nanmax(limit, initial=0.0)))
+    if shaft.permissible is not None:
+        axis.axhline(scale * shaft.permissible, linestyle="-.", color="0.3", linewidth=1.2, label="permissible")
+        top = max(top, scale * shaft.permissible)
     for barred in shaft.barred:
         colour = "0.85" if barred.allowed else "#f4c7c3"
         axis.axvspan(barred.start * RPM, barred.end * RPM, color=colour, zorder=0)

@@ -311,6 +311,8 @@ class TorsionalCalculation(Mapping[str, ShaftVibration]):
                 columns |= {"stress": one.stress, "notch_stress": one.notch_stress}
             if one.limits is not None:
                 columns |= dict(zip(("tau_c", "tau_t"), one.limits, strict=True))
+            if one.permissible is not None:
+                columns["permissible"] = one.permissible
             rows += frames(columns).to_dict("records")
         return frames(rows)
 
@@ -318,7 +320,7 @@ class TorsionalCalculation(Mapping[str, ShaftVibration]):
         """Vibratory stress (or torque, without a section) over speed with its largest orders and limits (extra `plot`).
 
         Args:
-            *shafts: names; by default those with a section, or else all.
+            *shafts: names; by default those with a section or a permissible torque, or else all.
 
         Raises:
             SignalError: there is no such shaft.
@@ -326,7 +328,10 @@ class TorsionalCalculation(Mapping[str, ShaftVibration]):
         """
         from shaftwork.torsional.torsional_pictures import picture
 
-        named = shafts or tuple(name for name, one in self.shafts.items() if one.section is not None)
+        looked_at = (
+            name for name, one in self.shafts.items() if one.section is not None or one.permissible is not None
+        )
+        named = shafts or tuple(looked_at)
         return picture(self.heading, [self[name] for name in named or tuple(self.shafts)])
 
 
