@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sympy
+from sympy import Integer
 
 import shaftwork as sw
 
@@ -176,6 +177,8 @@ def test_the_printed_sum_is_the_law_that_is_computed(table: sw.Harmonics) -> Non
     at = {angle: 0.7, speed: 11.0}
     assert float(short.subs(at)) == pytest.approx(float(terms.subs(at)), rel=1e-12)
     assert short.doit() == terms
+    other = sw.Harmonics((1.0,), (5.0,)).summed(angle, Integer(0))
+    assert float((short + other).subs(at)) == pytest.approx(float(terms.subs(at)) + 5 * math.cos(0.7), rel=1e-12)
     for symbol in (angle, speed):
         assert float(short.diff(symbol).subs(at)) == pytest.approx(float(terms.diff(symbol).subs(at)), abs=1e-9)
 

@@ -303,8 +303,8 @@ class HarmonicTable(Atom):  # type: ignore[misc]
     def __getnewargs__(self) -> tuple[Harmonics, str]:
         return self.harmonics, self.mark
 
-    def _hashable_content(self) -> tuple[Harmonics, str]:
-        return self.harmonics, self.mark
+    def _hashable_content(self) -> tuple[str, str]:
+        return repr(self.harmonics), self.mark  # texts, by which sympy sorts the terms of a sum
 
     def _sympystr(self, _printer: Any) -> str:
         return repr(self.harmonics)

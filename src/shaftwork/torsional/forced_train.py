@@ -152,11 +152,11 @@ class ForcedTrain:
         if not callable(at):
             always = motions(at, self.t, inputs)
             return lambda _: always
-        kept = BoundedCache[float, LinearModel | ExactModel](MOST_POINTS)
+        points = BoundedCache[float, LinearModel | ExactModel](MOST_POINTS)
         if isinstance(at, TurningTrain) and not exact_shafts(self.model.netlist, every=self.exact):
             about = at.near(self.t, inputs)
-            return lambda speed: kept(speed, lambda: about(speed))
-        return lambda speed: kept(speed, lambda: motions(at(speed), self.t, inputs))
+            return lambda speed: points(speed, lambda: about(speed))
+        return lambda speed: points(speed, lambda: motions(at(speed), self.t, inputs))
 
     def amplitudes(self, speeds: Array, names: Sequence[str]) -> dict[str, Complex]:
         """Complex amplitudes of quantities in every order at speeds in rad/s: (n, k), along a part (n, k, places).
