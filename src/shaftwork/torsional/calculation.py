@@ -71,7 +71,7 @@ def torsional_calculation(
     train = forced_train(network_of(net), misfire, at, exact=exact, t=t)
     shafts = _torques_of(train.network)
     of_shafts = _completed(several("sections", sections), net, shafts)
-    bounds = _permissible(permissible or {}, shafts)
+    bounds = _permissible({} if permissible is None else permissible, shafts)
     top = None if rated is None else in_si("rated", rated, "rad/s", above=0)
     if top is None and (bare := [one.shaft for one in of_shafts.values() if one.design is not None]):
         raise ParameterError(
