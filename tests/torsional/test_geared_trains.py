@@ -36,7 +36,7 @@ WATER = 130.0
 """Damping at the propeller, N m s."""
 
 
-def geared(shaft: sw.ShaftModel | None = None) -> sw.Network:
+def geared(shaft: sw.Lumped | None = None) -> sw.Network:
     """Inline four, gear that turns back, propeller; with a model, the line to the propeller is a long shaft."""
     net = sw.Network("geared four")
     for k, angle in enumerate(sw.HarmonicTorque.firing_angles((1, 2, 4, 3))):

@@ -331,6 +331,7 @@ class HarmonicSum(Abbreviated):
 
     @classmethod
     def eval(cls, angle: Expr, speed: Expr, table: HarmonicTable) -> Expr | None:
+        """Its value where angle and speed are numbers; None elsewhere."""
         return table.harmonics.torque(angle, speed) if angle.is_number and speed.is_number else None
 
     def doit(self, **_hints: Any) -> Expr:
