@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 HOLZER_MODES = 3
 """Modes in tables of their own, the lowest."""
 MOST_MODES = 30
-"""Modes in the table, the lowest."""
+"""Modes in the table, the lowest, and resonances: a page."""
 
 
 def frequencies(subject: Subject) -> str:
@@ -78,6 +78,7 @@ def torsional(subject: Subject) -> str:
         columns(heads, rows, (3, *(1.5 for _ in heads[2:]), 4)),
         _with_letters(listed(tuple(map(_with_squares, calculation.notes)))),
         picture("torsional", "Vibratory stress or torque over the speed, with the permitted stresses"),
+        _resonances(calculation),
         *map(_holzer, calculation.modes[:HOLZER_MODES]),
         _heat(calculation),
     )
@@ -111,6 +112,22 @@ def _holzer(mode: Any) -> str:
         columns(("Mass", "Amplitude", "Torque in kN m"), masses, (4, 3, 3)),
         columns(("Shaft", "Torque in kN m", r"Stress in N/mm$^2$"), shafts, (4, 3, 3)),
     )
+
+
+def _resonances(calculation: Any) -> str:
+    """Where excited orders meet natural frequencies, from the lowest speed on."""
+    rows = [
+        (
+            number(one.speed * 30 / math.pi),
+            number(one.order),
+            in_text(one.mode),
+            number(one.frequency),
+            number(one.damping),
+        )
+        for one in calculation.resonances[:MOST_MODES]
+    ]
+    heads = ("Resonance at 1/min", "Order", "Mode", "Frequency in Hz", "Damping ratio")
+    return columns(heads, rows, (3, 2, 3, 3, 3))
 
 
 def _heat(calculation: Any) -> str:
