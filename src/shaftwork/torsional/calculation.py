@@ -23,6 +23,7 @@ from shaftwork.torsional.order_excitations import Misfire
 from shaftwork.torsional.shaft_sections import Section
 from shaftwork.torsional.shaft_vibration import ShaftVibration, worst_along
 from shaftwork.torsional.torsional_result import TorsionalCalculation
+from shaftwork.torsional.undamped_resonances import without_bound
 
 if TYPE_CHECKING:
     from shaftwork.torsional.forced_train import ForcedTrain
@@ -83,7 +84,8 @@ def torsional_calculation(
     amplitudes = train.amplitudes(n, tuple(shafts.values()))
     vibrations: dict[str, ShaftVibration] = {}
     for shaft, torque in shafts.items():
-        torques, places = worst_along(amplitudes[torque], train.orders, train.places(torque))
+        swings = without_bound(amplitudes[torque], train, n, resonances)
+        torques, places = worst_along(swings, train.orders, train.places(torque))
         vibration = ShaftVibration(shaft, n, train.orders, torques, places, of_shafts.get(shaft), None)
         vibrations[shaft] = _judged(vibration, train, torque, top, bounds.get(shaft))
     return TorsionalCalculation(net.name, n, train.orders, vibrations, resonances, top, train.failing, train, shafts)

@@ -21,7 +21,7 @@ from shaftwork.torsional.holzer import HolzerTable, holzer_table
 from shaftwork.torsional.order_sums import POINTS, cycle_of, waveform
 from shaftwork.torsional.shaft_sections import LAST
 from shaftwork.torsional.shaft_vibration import HEADS, ShaftVibration, worst_along
-from shaftwork.torsional.undamped_resonances import undamped_note
+from shaftwork.torsional.undamped_resonances import is_undamped, undamped_note, without_bound
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -129,7 +129,7 @@ class TorsionalCalculation(Mapping[str, ShaftVibration]):
     @property
     def undamped(self) -> tuple[Resonance, ...]:
         """Resonances that nothing damps, where torques have no bound in a linear calculation."""
-        return tuple(one for one in self.resonances if abs(one.damping) < TYPED)
+        return tuple(filter(is_undamped, self.resonances))
 
     def __str__(self) -> str:
         return "\n".join([self.heading, *in_columns([self.heads, *self.table]), *self.notes])
@@ -187,6 +187,8 @@ class TorsionalCalculation(Mapping[str, ShaftVibration]):
         amplitudes = self.train.amplitudes(n, (quantity,))[quantity]
         if name not in self.torques and amplitudes.ndim > 2:
             raise SignalError(f"'{name}' is read along a part. Name the shaft, '{name.rpartition('.')[0]}'.")
+        if name in self.torques:
+            amplitudes = without_bound(amplitudes, self.train, n, self.resonances)
         parts = np.asarray(worst_along(amplitudes, self.orders, self.train.places(quantity))[0][0])
         if not np.isfinite(parts).all():
             raise ParameterError(

@@ -6,15 +6,45 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from shaftwork.components.mechanics import Spring
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.parameters import in_si
 from shaftwork.network.netlist import first_few, listed
-from shaftwork.results.observer import RPM
+from shaftwork.numerics.tolerances import TYPED
+from shaftwork.results.observer import RPM, Array, Complex
+from shaftwork.torsional.order_excitations import amplitudes_of
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.network import Network
-    from shaftwork.torsional.forced_train import Resonance
+    from shaftwork.torsional.forced_train import ForcedTrain, Resonance
+
+
+def is_undamped(resonance: Resonance) -> bool:
+    """Whether nothing damps it: a ratio that rounding alone makes."""
+    return abs(resonance.damping) < TYPED
+
+
+def without_bound(torques: Complex, train: ForcedTrain, speeds: Array, resonances: Sequence[Resonance]) -> Complex:
+    """The torques of a shaft, infinite where an order excites a resonance that nothing damps.
+
+    There a computed torque is finite by rounding alone, and above that of the sources over twice any damping ratio.
+
+    Args:
+        torques: (n, k), or along a shaft (n, k, places).
+        train: with its excitations.
+        speeds: (n,) of the reference shaft, rad/s.
+        resonances: damped ones among them are left out.
+    """
+    bounded = torques.copy()
+    excited = np.abs(amplitudes_of(train.excitations, train.orders, speeds)).sum(axis=0)
+    for one in filter(is_undamped, resonances):
+        order = int(np.abs(np.asarray(train.orders) - one.order).argmin())
+        for place in np.flatnonzero(np.abs(speeds - one.speed) <= TYPED * one.speed):
+            there = bounded[place, order]
+            bounded[place, order] = np.where(np.abs(there) > excited[place, order] / TYPED, np.inf, there)
+    return bounded
 
 
 def undamped_note(resonances: Sequence[Resonance], net: Network, shafts: Iterable[str]) -> str:
