@@ -302,7 +302,36 @@ def test_an_undamped_resonance_is_named_with_the_shafts_that_lack_damping_and_wh
     assert damped["s"].by_order.max() == pytest.approx(2.5 / 0.01, rel=1e-3)
 
 
-def test_a_shaft_and_a_damper_at_rest_have_hints_of_their_own() -> None:
+@pytest.mark.parametrize("exact", [False, True])
+def test_what_rounding_alone_bounds_is_infinite(exact: bool) -> None:  # noqa: FBT001 (of the parametrisation)
+    net = line(sw.Lumped(12))
+    for name in ("first", "second"):
+        part = next(part for part in net.parts if part.name == name)
+        net.replace(part.changed(damping=0.0))
+    net.remove("friction")
+    net.remove("water")
+    calculation = sw.torsional_calculation(net, [20.0, 90.0], exact=exact)
+    assert calculation.undamped
+    for one in calculation.undamped:
+        place = int(np.abs(calculation.speeds - one.speed).argmin())
+        assert np.isinf(calculation["first"].amplitude[place])
+    assert np.isfinite(calculation["first"].amplitude[[0, -1]]).all()
+
+
+def test_a_damper_at_a_node_of_a_mode_leaves_it_undamped() -> None:
+    net = sw.Network("symmetric")
+    net.add(sw.HarmonicTorque("h", harmonics=sw.Harmonics((1.0,), (5.0,))), "a")
+    for node, inertia in (("a", 1.0), ("b", 0.5), ("c", 1.0)):
+        net.add(sw.Inertia(f"J{node}", J=inertia), node)
+    net.add(sw.Spring("s1", c=400.0), "a", "b")
+    net.add(sw.Spring("s2", c=400.0), "b", "c")
+    net.add(sw.Damper("middle", d=3.0), "b")
+    calculation = sw.torsional_calculation(net, [10.0, 45.0])
+    assert [one.mode for one in calculation.undamped] == ["mode 1"]  # the ends swing against each other
+    assert len(calculation.resonances) == 2  # the other one is damped
+
+
+def test_a_shaft_without_damping_is_told_its_own_damping() -> None:
     net = sw.Network("undamped shaft")
     net.add(sw.HarmonicTorque("h", harmonics=sw.Harmonics((1.0,), (5.0,))), "a")
     net.add(sw.Inertia("J1", J=1.0), "a")

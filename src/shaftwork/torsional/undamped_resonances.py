@@ -65,9 +65,8 @@ def undamped_note(resonances: Sequence[Resonance], net: Network, shafts: Iterabl
         + first_few([f"{one.speed * RPM:.5g} 1/min in order {one.order:g}" for one in several], separator=", ")
         for mode, several in modes.items()
     )
-    return (
-        f"Nothing damps these resonances, so torques have no bound there: {where}. {_remedy(resonances, net, shafts)}"
-    )
+    said = "Nothing damps these resonances, so torques have no bound where an order excites them"
+    return f"{said}: {where}. {_remedy(resonances, net, shafts)}"
 
 
 def _remedy(resonances: Sequence[Resonance], net: Network, shafts: Iterable[str]) -> str:
