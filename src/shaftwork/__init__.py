@@ -43,6 +43,7 @@ if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
     from shaftwork.components.contacts import *
     from shaftwork.components.sources import *
     from shaftwork.components.excitations import *
+    from shaftwork.components.harmonics import Harmonics as Harmonics
     from shaftwork.components.drives import *
     from shaftwork.components.electrical import *
     from shaftwork.components.friction import *
@@ -128,7 +129,7 @@ _HOME = {
     ),
     "shaftwork.components.drives": ("motors",),
     "shaftwork.components.bucket_wheel": ("Soil",),
-    "shaftwork.components.excitations": ("Harmonics",),
+    "shaftwork.components.harmonics": ("Harmonics",),
     "shaftwork.components.noise": ("HeldNoise", "SmoothNoise"),
     "shaftwork.components.tables": ("Table",),
     "shaftwork.components.laws": ("PWM", "Ramp", "Step", "omega", "phi", "psi", "s", "t", "u", "v"),

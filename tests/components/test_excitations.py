@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 import sympy
+from sympy import Integer
 
 import shaftwork as sw
 
@@ -123,3 +126,110 @@ def test_a_text_that_is_no_harmonics_is_refused() -> None:
     with pytest.raises(sw.ParameterError, match="are no harmonics"):
         sw.HarmonicTorque("h", harmonics="loud")  # type: ignore[arg-type]
     assert sw.Harmonics.read(repr(HARMONICS)) == HARMONICS
+
+
+def test_equal_cylinders_print_one_sum_each_and_one_table() -> None:
+    net = sw.Network("engine")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    for number, angle in enumerate(sw.HarmonicTorque.firing_angles((1, 3, 2)), 1):
+        net.add(sw.HarmonicTorque(f"cylinder {number}", harmonics=HARMONICS, firing_angle=angle), "a")
+    printed = net.equations().latex()
+    assert printed.count(r"\sum_{k} T_{k} \, \cos") == 3
+    assert printed.count(r"\\ 30 & 20 & 10") == 1
+    assert printed.count(r"\\ 0.3 & -0.4 & 2") == 1
+    assert r"\alpha_{\mathrm{cylinder},3}" in printed  # where the cycle begins, by its letter
+    assert "varphi_{f" not in printed
+    assert r"those of cylinder 1, cylinder 2 and cylinder 3." in printed
+    valued = net.equations().latex(values=True)
+    assert not re.search(r"(?<![\d.])1(\.0)? \\, ", valued)  # no factor 1
+    document = net.equations().document()
+    assert "amplitude of order $k$" in document
+
+
+def test_torques_with_other_orders_have_letters_of_their_own_and_say_at_which_speed_they_hold() -> None:
+    net = sw.Network("engine")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.HarmonicTorque("gas", harmonics=HARMONICS), "a")
+    net.add(sw.HarmonicTorque("wake", harmonics=sw.Harmonics.propeller(4, 1000.0, 12.5)), "a")
+    over_speed = sw.Harmonics((1.0, 2.0), ((10.0, 4.0), (20.0, 6.0)), speeds=(10.0, 20.0))
+    net.add(sw.HarmonicTorque("pump", harmonics=over_speed), "a")
+    printed = net.equations().latex()
+    assert r"\left(\frac{\omega_{1}}{12.5}\right)^{2} \, \sum_{k} T_{\mathrm{B}, k}" in printed
+    assert r"the amplitudes at $12.5\,\mathrm{rad/s}$" in printed
+    assert r"T_{\mathrm{C}, k}(|\omega_{1}|)" in printed
+    assert r"T_{\mathrm{C}, k}(20\,\mathrm{rad/s})" in printed
+
+
+def test_many_equal_cylinders_are_one_row_whose_index_is_not_that_of_the_orders() -> None:
+    net = sw.Network("engine")
+    for number in range(1, 7):
+        net.add(sw.Inertia(f"J{number}", J=1.0), f"n{number}")
+        net.add(sw.HarmonicTorque(f"h{number}", harmonics=HARMONICS, firing_angle=0.5 * number), f"n{number}")
+    printed = net.equations().latex(form="kirchhoff")
+    assert r"\kappa_{\mathrm{h},j} \, \sum_{k} T_{k}" in printed
+    assert r"\text{for } j = 1, \dots, 6" in printed
+
+
+@pytest.mark.parametrize("table", [HARMONICS, sw.Harmonics.propeller(3, 900.0, 15.0)], ids=["steady", "growing"])
+def test_the_printed_sum_is_the_law_that_is_computed(table: sw.Harmonics) -> None:
+    angle, speed = sympy.symbols("angle speed", real=True)
+    short, terms = table.summed(angle, speed), table.torque(angle, speed)
+    at = {angle: 0.7, speed: 11.0}
+    assert float(short.subs(at)) == pytest.approx(float(terms.subs(at)), rel=1e-12)
+    assert short.doit() == terms
+    other = sw.Harmonics((1.0,), (5.0,)).summed(angle, Integer(0))
+    assert float((short + other).subs(at)) == pytest.approx(float(terms.subs(at)) + 5 * math.cos(0.7), rel=1e-12)
+    for symbol in (angle, speed):
+        assert float(short.diff(symbol).subs(at)) == pytest.approx(float(terms.diff(symbol).subs(at)), abs=1e-9)
+
+
+def test_a_model_file_has_the_table_of_equal_cylinders_once(tmp_path: Path) -> None:
+    net = sw.Network("engine")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    for number in (1, 2, 3):
+        net.add(sw.HarmonicTorque(f"cylinder {number}", harmonics=HARMONICS), "a")
+    net.save(tmp_path / "engine.toml")
+    text = (tmp_path / "engine.toml").read_text()
+    assert text.count("Harmonics(") == 1
+    assert text.count('harmonics = "as in cylinder 1"') == 2
+    assert sw.Network.load(tmp_path / "engine.toml").parts == net.parts
+    (tmp_path / "wrong.toml").write_text(text.replace("as in cylinder 1", "as in cylinder 3", 1))
+    with pytest.raises(sw.ModelFileError, match=r"line 20.*no part above is 'cylinder 3' and has harmonics"):
+        sw.Network.load(tmp_path / "wrong.toml")
+
+
+def test_gas_forces_over_speed_are_those_of_each_row() -> None:
+    rows = (((3e5, 0.0), (4e5, 2e5)), ((1e5, 2e5), (5e5, 1e5)))  # cosines and sines at each speed
+    table = sw.Harmonics.gas_force(
+        (0.5, 1.0), [row[0] for row in rows], [row[1] for row in rows], bore=0.2, stroke=0.3, speeds=(40.0, 80.0)
+    )
+    for speed, (cosines, sines) in zip((40.0, 80.0), rows, strict=True):
+        alone = sw.Harmonics.gas_force((0.5, 1.0), cosines, sines, bore=0.2, stroke=0.3)
+        assert table.at(speed) == pytest.approx(alone.at(speed), rel=1e-12)
+    with pytest.raises(sw.ParameterError, match="shape"):
+        sw.Harmonics.gas_force((0.5, 1.0), ((1.0, 2.0),), ((1.0,),), bore=0.2, stroke=0.3, speeds=(40.0, 80.0))
+
+
+def test_harmonics_and_mean_inertia_are_the_mean_of_an_inertia_that_changes() -> None:
+    """At steady speed Lagrange's equation has m x' x'' omega^2, and the mean of m x'^2 over a turn is an integral."""
+    mass, stroke, rod = 30.0, 0.3, 0.5
+    phi = np.linspace(0.0, 2 * np.pi, 20001)
+    way = stroke / 2 * np.cos(phi) + np.sqrt(rod**2 - (stroke / 2 * np.sin(phi)) ** 2)
+    slope = np.gradient(way, phi, edge_order=2)
+    expected = mass * np.trapezoid(slope**2, phi) / (2 * np.pi)
+    inertia = sw.HarmonicTorque.reciprocating_inertia(mass, stroke=stroke, rod=rod)
+    assert inertia == pytest.approx(expected, rel=1e-6)  # differences of so many angles
+    r, share = stroke / 2, stroke / 2 / rod
+    # the textbook's first terms; the next one is of the order of share^4
+    assert inertia == pytest.approx(mass * r**2 / 2 * (1 + share**2 / 4), rel=share**4)
+
+
+def test_without_a_steady_state_the_message_says_what_has_one() -> None:
+    net = sw.Network("pulsating")
+    net.add(sw.HarmonicTorque("h", harmonics=HARMONICS, mean=100.0), "a")  # above the swing, so it turns
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.Damper("d", d=5.0), "a")
+    model = net.compile()
+    with pytest.raises(sw.SimulationError, match=r"sw.torsional_calculation.*parameters=\{'h.scale': 0\}"):
+        model.steady_state()
+    assert model.steady_state(parameters={"h.scale": 0})["J1.omega"] == pytest.approx(20.0)

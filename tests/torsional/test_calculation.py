@@ -248,6 +248,9 @@ def test_a_cycle_takes_from_the_life_what_its_half_range_takes() -> None:
         ({"misfire": "cylinder 9"}, "'cylinder 9' is no HarmonicTorque"),
         ({"misfire": 2}, "must be the name of a cylinder"),
         ({"rated": -1.0}, "rated = -1.0 must be above 0"),
+        ({"permissible": {"s9": 1.0}}, "permissible: 's9' is no spring or shaft here"),
+        ({"permissible": {"s1": -1.0}}, r"permissible\['s1'\] = -1.0 must be above 0"),
+        ({"permissible": 5.0}, "must say by shaft what torque may last"),
     ],
 )
 def test_what_is_wrong_is_said_once(options: dict[str, object], message: str) -> None:
@@ -274,3 +277,130 @@ def test_a_train_without_excitation_or_with_a_shaft_that_slips_is_refused() -> N
     with pytest.raises(sw.SignalError, match="'s9' is no spring or shaft of 'engine'"):
         sw.torsional_calculation(engine(), [10.0, 20.0])["s9"]
     assert len(AMPLITUDES) == len(ORDERS)
+
+
+def test_an_undamped_resonance_is_named_with_the_shafts_that_lack_damping_and_what_to_give() -> None:
+    net = sw.Network("undamped")
+    net.add(sw.HarmonicTorque("h", harmonics=sw.Harmonics((1.0, 2.0), (5.0, 3.0))), "a")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.Spring("s", c=200.0), "a", "b")
+    net.add(sw.Inertia("J2", J=1.0), "b")
+    calculation = sw.torsional_calculation(net, [15.0, 25.0])
+    assert [(one.order, one.mode) for one in calculation.undamped] == [(1.0, "mode 1")]
+    assert calculation["s"].verdict == "NO BOUND where nothing damps"
+    (note,) = calculation.notes
+    assert "mode 1 (3.1831 Hz) at 190.99 1/min in order 1" in note
+    assert "Without damping: 's'" in note
+    damping = 0.01 * 200 / 20.0  # a loss factor of 1 % at 20 rad/s
+    assert f"d = {damping:.3g} N m s/rad for 's'" in note
+    with pytest.raises(sw.ParameterError, match=r"no bound at 20 rad/s.*Without damping: 's'"):
+        calculation.waveform("s", 20.0)
+    net.replace(sw.Spring("s", c=200.0, d=damping))
+    damped = sw.torsional_calculation(net, [15.0, 25.0])
+    assert not damped.notes
+    # of two equal masses half of the torque passes, magnified by 1 / loss factor
+    assert damped["s"].by_order.max() == pytest.approx(2.5 / 0.01, rel=1e-3)
+
+
+@pytest.mark.parametrize("exact", [False, True])
+def test_what_rounding_alone_bounds_is_infinite(exact: bool) -> None:  # noqa: FBT001 (of the parametrisation)
+    net = line(sw.Lumped(12))
+    for name in ("first", "second"):
+        part = next(part for part in net.parts if part.name == name)
+        net.replace(part.changed(damping=0.0))
+    net.remove("friction")
+    net.remove("water")
+    calculation = sw.torsional_calculation(net, [20.0, 90.0], exact=exact)
+    assert calculation.undamped
+    for one in calculation.undamped:
+        place = int(np.abs(calculation.speeds - one.speed).argmin())
+        assert np.isinf(calculation["first"].amplitude[place])
+    assert np.isfinite(calculation["first"].amplitude[[0, -1]]).all()
+
+
+def test_a_damper_at_a_node_of_a_mode_leaves_it_undamped() -> None:
+    net = sw.Network("symmetric")
+    net.add(sw.HarmonicTorque("h", harmonics=sw.Harmonics((1.0,), (5.0,))), "a")
+    for node, inertia in (("a", 1.0), ("b", 0.5), ("c", 1.0)):
+        net.add(sw.Inertia(f"J{node}", J=inertia), node)
+    net.add(sw.Spring("s1", c=400.0), "a", "b")
+    net.add(sw.Spring("s2", c=400.0), "b", "c")
+    net.add(sw.Damper("middle", d=3.0), "b")
+    calculation = sw.torsional_calculation(net, [10.0, 45.0])
+    assert [one.mode for one in calculation.undamped] == ["mode 1"]  # the ends swing against each other
+    assert len(calculation.resonances) == 2  # the other one is damped
+
+
+def test_a_shaft_without_damping_is_told_its_own_damping() -> None:
+    net = sw.Network("undamped shaft")
+    net.add(sw.HarmonicTorque("h", harmonics=sw.Harmonics((1.0,), (5.0,))), "a")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.Shaft("line", length=2.0, diameter=0.02, model=sw.Lumped(2)), "a", "b")
+    net.add(sw.Inertia("J2", J=1.0), "b")
+    (note,) = sw.torsional_calculation(net, [20.0, 45.0]).notes
+    frequency = float(sw.torsional_calculation(net, [20.0, 45.0]).undamped[0].frequency)
+    stiffness = 79.3e9 * math.pi * 0.02**4 / 32
+    assert f"damping = {0.01 * stiffness / (2 * math.pi * frequency):.3g} N m^2 s/rad for 'line'" in note
+
+
+def test_a_permissible_torque_is_judged_with_the_speeds_that_exceed_it() -> None:
+    free = sw.torsional_calculation(engine(), np.linspace(30.0, 200.0, 18))
+    bound = float(free["s4"].amplitude.max()) / 2
+    permissible = {"s4": bound, "s0": 1e6}
+    calculation = sw.torsional_calculation(engine(), np.linspace(30.0, 200.0, 18), permissible=permissible)
+    assert calculation["s0"].verdict == "below the permissible torque"
+    assert calculation["s0"].permitted is True
+    assert calculation["s4"].verdict == "ABOVE the permissible torque"
+    assert calculation.permitted is False
+    assert free.permitted is None
+    ends = [speed for span in calculation["s4"].exceeded for speed in span if 30.0 < speed < 200.0]
+    assert ends
+    for speed in ends:
+        again = sw.torsional_calculation(engine(), [speed, 2 * speed])["s4"].amplitude[0]
+        assert again == pytest.approx(bound, rel=1e-6)
+    assert "s4: above its permissible torque from" in str(calculation)
+    heads, row = calculation.heads, next(row for row in calculation.table if row[0] == "s4")
+    assert row[heads.index("permissible kN m")] == f"{bound / 1e3:.5g}"
+
+
+def test_the_row_of_a_shaft_is_at_the_speed_that_governs_it_and_has_its_units() -> None:
+    sections = [Section("s4", diameter=0.03, design="intermediate, flange", strength=500e6, scf=1.5)]
+    calculation = sw.torsional_calculation(engine(), np.linspace(30.0, 180.0, 16), sections=sections, rated=171.0)
+    shaft = calculation["s4"]
+    assert shaft.limits is not None
+    share = shaft.stress / shaft.limits[0]
+    assert shaft.governing == int(share.argmax())
+    row = dict(zip(calculation.heads, next(row for row in calculation.table if row[0] == "s4"), strict=True))
+    k = shaft.governing
+    assert float(row["at 1/min"]) == pytest.approx(shaft.speeds[k] / RPM, rel=1e-4)  # five digits
+    assert float(row["stress N/mm^2"]) == pytest.approx(shaft.stress[k] / 1e6, rel=1e-3)  # four digits
+    assert float(row["at notch N/mm^2"]) == pytest.approx(1.5 * shaft.stress[k] / 1e6, rel=1e-3)
+    assert float(row["tau_c N/mm^2"]) == pytest.approx(shaft.limits[0][k] / 1e6, rel=1e-3)
+    assert float(row["tau_t N/mm^2"]) == pytest.approx(shaft.limits[1][k] / 1e6, rel=1e-3)
+    assert "permissible kN m" not in calculation.heads  # nothing fills that column
+    for head in calculation.heads:
+        assert head in calculation._repr_html_()
+
+
+def test_speeds_that_end_below_those_of_the_rule_are_told() -> None:
+    sections = [Section("s4", diameter=0.06, design="intermediate, flange", strength=500e6)]
+    short = sw.torsional_calculation(engine(), [30.0, 150.0], sections=sections, rated=150.0)
+    assert any("asks for those up to 1504" in note for note in short.notes)
+    full = sw.torsional_calculation(engine(), [30.0, 157.5], sections=sections, rated=150.0)
+    assert not any("asks for" in note for note in full.notes)
+
+
+def test_heat_is_sorted_and_has_the_speed_of_the_most() -> None:
+    calculation = sw.torsional_calculation(engine(), speeds())
+    powers = [power for _, power, _ in calculation.heat]
+    assert powers == sorted(powers, reverse=True)
+    for part, power, speed in calculation.heat:
+        assert calculation.power_lost[part][list(calculation.speeds).index(speed)] == power
+
+
+def test_modes_say_at_which_speed_they_are_taken() -> None:
+    assert "the same at all speeds" in sw.torsional_calculation(engine(), [40.0, 120.0]).modes.title
+    net = engine()
+    net.remove("load")
+    net.add(sw.TorqueSource("water", tau=-0.01 * sw.omega**2), "n5")
+    assert "operating point at 1145.9 1/min" in sw.torsional_calculation(net, [40.0, 120.0]).modes.title

@@ -15,6 +15,7 @@ from shaftwork.codegen.start_names import inner_nodes, node_of, speed_at
 from shaftwork.core.errors import SimulationError
 from shaftwork.core.notices import hint
 from shaftwork.formulation.form import StateForm
+from shaftwork.network.netlist import listed
 from shaftwork.numerics.tolerances import EPS, SAME
 
 TINY = float(np.finfo(float).tiny)
@@ -106,6 +107,15 @@ def _still_changing(form: StateForm, x: Array, rate: Array, worst: int) -> Simul
         f"No steady state was found: '{form.states[worst].name}' still changes by {rate[worst]:.3g} per second at "
         f"{x[worst]:.6g}."
     )
+    swings = (f"{part.name}.{part.component.swing}" for part in form.graph.parts if part.component.swing)
+    if swinging := [name for name in swings if form.graph.parameters.get(name)]:
+        means = ", ".join(f"'{name}': 0" for name in swinging[:2]) + (", ..." if len(swinging) > 2 else "")
+        verb = "swing" if len(swinging) > 1 else "swings"
+        return SimulationError(
+            f"{message} {listed([name.rpartition('.')[0] for name in swinging])} {verb} with the angle of the shaft, "
+            "so nothing is steady. sw.torsional_calculation(net, speeds) has the vibration about a steady speed; the "
+            f"operating point of the mean torques is steady_state(parameters={{{means}}})."
+        )
     if worst >= form.torques.stop:
         return SimulationError(
             f"{message} A law reads it, so nothing is steady while it changes. Where a torque pulsates with the angle "

@@ -40,6 +40,15 @@ class Delayed(Function):  # type: ignore[misc]
         return rf"\left[ {printer.doprint(self.args[0])} \right]_{{t - {printer.doprint(self.args[1])}}}"
 
 
+class Abbreviated(Function):  # type: ignore[misc]
+    """A long expression in a law that equations print by a short form; what computes reads it in full, `doit()`."""
+
+
+def in_full(law: Expr) -> Expr:
+    """A law with what print abbreviates in full."""
+    return law.xreplace({short: short.doit() for short in law.atoms(Abbreviated)})
+
+
 def across_of(port: str) -> Symbol:
     """In a law or guard: the across variable of a port or inner node of the same part, against the reference."""
     return Symbol(f"across of {port}", real=True)

@@ -191,7 +191,7 @@ def _against(graph: CircuitGraph, start: int, torque: float) -> str:
     pairs = (
         {node: value_of(factor) for node, factor in column.items()} for column in columns if len(column) == 2
     )  # ends of a spring, or shafts of a gear of two
-    speeds = speeds_along(graph, start, pairs)
+    speeds = speeds_along(graph, {start: 1.0}, pairs)
     loads: dict[str, float] = {}
     for part in graph.parts:
         for node in {*part.nodes.values()} & speeds.keys():
@@ -204,12 +204,14 @@ def _against(graph: CircuitGraph, start: int, torque: float) -> str:
     return f", against {total:.4g} N*m of {' and '.join(loads)}{stuck}"
 
 
-def speeds_along(graph: CircuitGraph, start: int, joints: Iterable[Mapping[int, float]]) -> dict[int, float]:
-    """Speeds of the nodes that are joined to one, over its own.
+def speeds_along(
+    graph: CircuitGraph, starts: Mapping[int, float], joints: Iterable[Mapping[int, float]]
+) -> dict[int, float]:
+    """Speeds of the nodes that are joined to some whose speeds are known, these among them.
 
     Args:
         graph: the network.
-        start: the one.
+        starts: node to speed of those.
         joints: node to factor, in sums that are zero; that of the frame is.
     """
     at: list[list[dict[int, float]]] = [[] for _ in graph.nodes]
@@ -217,7 +219,7 @@ def speeds_along(graph: CircuitGraph, start: int, joints: Iterable[Mapping[int, 
         moving = {node: factor for node, factor in joint.items() if node != GROUND}
         for node in moving if len(moving) > 1 else ():
             at[node].append(moving)
-    speeds, ends = {start: 1.0}, [start]
+    speeds, ends = {**starts}, [*starts]
     while ends:
         for joint in at[ends.pop()]:
             open_ends = [node for node in joint if node not in speeds]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import compress
 from typing import Any
 
@@ -30,7 +30,7 @@ from shaftwork.frequency import campbell as diagram
 from shaftwork.frequency.linear_model import ExactModel, LinearModel, linear_model
 from shaftwork.frequency.linearization import Linearization
 from shaftwork.frequency.natural_modes import MOVES, Modes
-from shaftwork.network.graph import CircuitGraph, Reading, readings_of
+from shaftwork.network.graph import GROUND, CircuitGraph, Reading, readings_of
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import listed
 from shaftwork.pipeline.arguments import Names, Point, Time, as_names
@@ -65,21 +65,36 @@ def speeds_to_give(model: CompiledModel, reference: int | None = None) -> Mappin
 def turning_speeds(graph: CircuitGraph, start: int) -> dict[int, float]:
     """Speeds of the nodes over that of one while no twist changes; those that no joint ties follow by their dampers.
 
-    What hangs on a damper alone, as the ring of a viscous damper does, turns with its shaft.
+    What hangs on a damper alone, as the ring of a viscous damper does, turns with its shaft. What the frame holds, as
+    the ring of a planetary gear, stands, unless it is tied to what turns.
 
     Args:
         graph: the network.
         start: the node whose speed is 1.
     """
     joined = list(_joints(graph))
-    speeds = speeds_along(graph, start, joined)
+    speeds = speeds_along(graph, {start: 1.0}, joined)
+    standing = (node for node in _held(graph, joined) if node not in speeds)
+    speeds = speeds_along(graph, {**speeds, **dict.fromkeys(standing, 0.0)}, joined)
     dampers = (graph.branches[k] for part in graph.parts if part.component.role == "loss" for k in part.branches)
     hanging = (
         {branch.plus: 1.0, branch.minus: -1.0}
         for branch in dampers
         if branch.template.kind in (Kind.CONDUCTANCE, Kind.LAW) and not {branch.plus, branch.minus} <= speeds.keys()
     )
-    return speeds_along(graph, start, [*joined, *hanging])
+    return speeds_along(graph, speeds, [*joined, *hanging])
+
+
+def _held(graph: CircuitGraph, joints: Sequence[Mapping[int, float]]) -> Iterator[int]:
+    """The nodes that the frame holds: by a spring, a rigid joint or a prescribed speed of zero."""
+    for branch in graph.branches:
+        if branch.template.kind is Kind.ACROSS_SOURCE and branch.template.law == 0:
+            yield from (node for node in (branch.plus, branch.minus) if node != GROUND)
+    modal = {node for part in graph.parts if part.modes for node in part.nodes.values()}  # which may let go
+    for joint in joints:
+        moving = [node for node in joint if node != GROUND]
+        if len(moving) == 1 and moving[0] not in modal:
+            yield moving[0]
 
 
 def _joints(graph: CircuitGraph) -> Iterator[Mapping[int, float]]:
@@ -100,6 +115,8 @@ def as_multiple(ratio: float | None) -> str:
     if ratio is None:
         return "..."
     sign, size = "-" * (ratio < 0), abs(ratio)
+    if size == 0:
+        return "0"
     if abs(size - 1) < MOVES:
         return f"{sign}n"
     return f"{sign}n/{1 / size:.10g}" if size < 1 else f"{sign}{size:.10g}*n"

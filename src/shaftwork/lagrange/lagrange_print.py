@@ -66,6 +66,7 @@ class _LagrangeBlocks:
         yield Block("Constraints with a reaction that does work", imposed)
         yield Block("where", tuple(self._laws()))
         yield self.blocks.derived()
+        yield self.blocks.orders()
 
     def _general(self) -> Iterator[Line]:
         """Abdelkader 2016, (18) and (19), with what linear dampers lose."""

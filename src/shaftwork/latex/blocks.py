@@ -21,6 +21,7 @@ from shaftwork.equations.quantities import Quantities, ThroughQuantity, rate_of
 from shaftwork.equations.spelling import INDEX_CLOSES, INDEX_OPENS, in_text
 from shaftwork.latex.compact_rows import SpectralShaft, compact_assembly, in_sums, spectral_shafts
 from shaftwork.latex.field_lines import lines_of_field
+from shaftwork.latex.harmonic_tables import HarmonicTables
 from shaftwork.latex.nomenclature import Cells, breakable, unit
 from shaftwork.latex.printing import Line, Writer, with_rates
 from shaftwork.latex.shaft_sums import MEANING, Sums, printed_sums, printed_weights, rows_of_sums
@@ -114,6 +115,7 @@ class Blocks:
             noises = (noise for term in self._split[flow][1] for noise in term.atoms(HeldNoise, SmoothNoise))
             for name in sorted({self.writer.latex(noise).partition(r"\left(")[0] for noise in noises}):
                 yield f"${name}$", "function with random values", breakable(graph.parts[flow.part].name), "--"
+        yield from self.tables.helpers()
         yield from rows_of_sums(self.sums, self.used)
 
     def derived(self) -> Block:
@@ -126,6 +128,15 @@ class Blocks:
             (*(self.writer.line(sides(symbol, (law,))) for symbol, law in pairs), *weights.values()),
             MEANING if weights else "",
         )
+
+    def orders(self) -> Block:
+        """The tables of the orders of torques that swing with the angle."""
+        return Block("Orders of the torques", tuple(self.tables.lines()), self.tables.remark)
+
+    @cached_property
+    def tables(self) -> HarmonicTables:
+        """Of the orders in the laws."""
+        return HarmonicTables(self.equations.form.graph)
 
     @cached_property
     def shafts(self) -> tuple[SpectralShaft, ...]:
@@ -218,7 +229,7 @@ class Blocks:
         angles = map(self.quantities.angle, range(len(graph.nodes)))
         rates = {name for name in printed if name.startswith("der(")}
         last = rates | {angle.name for angle in angles} | {name for of_shaft in sums for name in of_shaft}
-        return Writer(printed, parameters, last, values, self.equations.inverses)
+        return Writer(printed, parameters, last, values, self.equations.inverses, self.tables.marked)
 
     def _line(self, row: Sides, remark: str = "") -> Line:
         return self.writer.line(in_sums(row, self.shafts), remark)

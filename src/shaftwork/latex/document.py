@@ -76,7 +76,7 @@ def printed_blocks(blocks: Blocks, form: Form | None) -> tuple[Block, ...]:
         ShaftworkError: there is no such form.
     """
     both = (*blocks.kirchhoff(twists=False), *blocks.state(laws=False)) if form is None else _form(blocks, form)
-    derived = () if form == "field" else (blocks.derived(),)
+    derived = () if form == "field" else (blocks.derived(), blocks.orders())
     return tuple(block for block in (*both, *derived) if block.lines)
 
 
@@ -118,7 +118,7 @@ def document(equations: Equations, form: Form | None, *, values: bool, title: st
     remarks: tuple[str, ...] = ()
     if form is None:
         sections = {
-            TITLES["kirchhoff"]: section((*blocks.kirchhoff(twists=False), blocks.derived())),
+            TITLES["kirchhoff"]: section((*blocks.kirchhoff(twists=False), blocks.derived(), blocks.orders())),
             TITLES["state"]: section(blocks.state(laws=False)),
         }
         try:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
-from sympy import Expr, Float, Heaviside, Integer, Piecewise, Pow, Symbol, true
+from sympy import Basic, Expr, Float, Heaviside, Integer, Piecewise, Pow, Symbol, true
 from sympy.printing.latex import LatexPrinter
 
 from shaftwork.components.laws import t as TIME
@@ -123,6 +123,7 @@ class Writer:
         last: names of the variables that stand behind a fraction, not above it: rates and coordinates.
         values: number of every parameter that is printed by its value; empty to print symbols.
         inverses: for parameters that are printed by their reciprocals the symbols of these.
+        tables: of orders, with the letters by which they are printed.
     """
 
     def __init__(
@@ -132,7 +133,9 @@ class Writer:
         last: Collection[str],
         values: Mapping[str, float],
         inverses: Mapping[Symbol, Symbol] = MappingProxyType({}),
+        tables: Mapping[Basic, Basic] = MappingProxyType({}),
     ) -> None:
+        self._tables = dict(tables)
         self._replaced: dict[Symbol, Expr] = {symbol: 1 / inverse for symbol, inverse in inverses.items()}
         self._last = {Symbol(name, real=True) for name in last}
         self._values = {Symbol(name, real=True): _number(value) for name, value in values.items()}
@@ -147,7 +150,7 @@ class Writer:
 
     def latex(self, expression: Expr) -> str:
         """An expression in LaTeX."""
-        valued = self._valued(expression)
+        valued = self._valued(expression.xreplace(self._tables) if self._tables else expression)
         self.used.update(dict.fromkeys(sorted(str(symbol.name) for symbol in valued.free_symbols)))
         return str(self._printer.doprint(self._in_order(valued).xreplace(self._ordered)))
 

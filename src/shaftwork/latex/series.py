@@ -121,13 +121,14 @@ def _stretches(numbers: Numbers) -> Iterator[Numbers]:
 
 
 def _general(lines: Sequence[Line], series: Series) -> Line:
-    """The row with running number k."""
+    """The row with running number k; j where it sums over orders k."""
+    letter = "j" if any(r"\sum_{k}" in piece for piece in lines[series.first].pieces) else "k"
     number, place = next((number, place) for number, place in series.members.items() if place == series.first)
     running = iter(series.running)
 
     def general(match: re.Match[str]) -> str:
-        return f"k{int(match[1]) - number:+d}".removesuffix("+0") if next(running) else match[1]
+        return f"{letter}{int(match[1]) - number:+d}".removesuffix("+0") if next(running) else match[1]
 
     line = lines[place].mapped(lambda text: INDEX.sub(general, text))
     numbers = ", ".join(listed(stretch, str, r"\dots") for stretch in series.stretches)
-    return replace(line, remark=r" \quad ".join(filter(None, (line.remark, rf"\text{{for }} k = {numbers}"))))
+    return replace(line, remark=r" \quad ".join(filter(None, (line.remark, rf"\text{{for }} {letter} = {numbers}"))))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import reprlib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, NoReturn
@@ -24,6 +26,8 @@ from shaftwork.network.expressions import parse
 from shaftwork.network.grammar import COMPARISONS, FUNCTION_NAMES, FUNCTIONS, LIMITS, fault_of, tokens_of
 from shaftwork.network.netlist import Netlist, Origin, Placed, title
 
+AS_IN = "as in "
+"""Before the name of an earlier part whose record a part has, too."""
 _SIGNS = {relation: sign for sign, relation in COMPARISONS.items()}
 
 
@@ -35,9 +39,8 @@ def netlist_text(netlist: Netlist) -> str:
     Raises:
         ModelFileError: a parameter has no text form.
     """
-    return textfile.write(
-        ModelText(netlist.name, tuple(_part_text(placed) for placed in netlist.placed), netlist.ports, netlist.impacts)
-    )
+    parts = tuple(_with_records_once(map(_part_text, netlist.placed)))
+    return textfile.write(ModelText(netlist.name, parts, netlist.ports, netlist.impacts))
 
 
 def write_netlist(netlist: Netlist, path: str | Path) -> None:
@@ -66,7 +69,7 @@ def read_netlist(path: str | Path) -> Netlist:
     model = textfile.read(_path_of(path))
     try:
         _refuse_endless_laws(model)
-        placed = tuple(_placed(part, str(path)) for part in model.parts)
+        placed = tuple(_placed(part, str(path)) for part in _with_all_records(model.parts))
         return Netlist(model.name, placed, model.ports, model.impacts)
     except ModelFileError as error:
         raise ModelFileError(f"{path}: {error}") from None
@@ -123,6 +126,47 @@ def _part_text(placed: Placed) -> PartText:
     part = placed.part
     values = {name: _saved(part, name) for name in part.declared if not _is_default(part, name)}
     return PartText(type(part).__name__, part.name, placed.nodes, values, part.symbol)
+
+
+def _with_records_once(parts: Iterable[PartText]) -> Iterator[PartText]:
+    """Parts with each long record once: a later part that has the same says of whom it is, "as in cylinder 1"."""
+    long = 80  # characters; a shorter one is easier to read where it is
+    owners: dict[tuple[str, Any], str] = {}
+    for part in parts:
+        values = dict(part.parameters)
+        for name, text in part.parameters.items():
+            if _is_record(part, name) and isinstance(text, str) and len(text) > long:
+                owner = owners.setdefault((name, text), part.name)
+                values[name] = text if owner == part.name else f"{AS_IN}{owner}"
+        yield replace(part, parameters=values)
+
+
+def _with_all_records(parts: Iterable[PartText]) -> Iterator[PartText]:
+    """The same read: parts with their records in full.
+
+    Raises:
+        ModelFileError: a record is that of a part which does not stand before, or has none of that name.
+    """
+    before: dict[str, Mapping[str, Any]] = {}
+    for part in parts:
+        values = dict(part.parameters)
+        for name, text in part.parameters.items():
+            if _is_record(part, name) and isinstance(text, str) and text.startswith(AS_IN):
+                owner = text.removeprefix(AS_IN)
+                if name not in before.get(owner, {}):
+                    raise _fault(
+                        part,
+                        name,
+                        f"{name} = {text!r}: no part above is '{owner}' and has {name}. Name one, or write it out.",
+                    )
+                values[name] = before[owner][name]
+        before[part.name] = values
+        yield replace(part, parameters=values)
+
+
+def _is_record(part: PartText, name: str) -> bool:
+    declared = getattr(_class_of(part.type), "declared", {}).get(name)
+    return declared is not None and declared.record is not None
 
 
 def _is_default(part: Component, name: str) -> bool:

@@ -34,6 +34,7 @@ from shaftwork.components.branches import (
     LossyCoupling,
     ThroughLaw,
     ThroughStore,
+    in_full,
     readings_in,
     rigid,
     through_of,
@@ -338,9 +339,9 @@ class _Resolver:
         return dataclasses.replace(template, conservative=branch.conservative, stored=stored, symbols=symbols)
 
     def _in_parameters(self, *laws: Expr) -> tuple[tuple[Expr, ...], tuple[Symbol, ...]]:
-        """Laws without derived quantities, and the symbols in them."""
+        """Laws without derived quantities and abbreviations, and the symbols in them."""
         if laws not in self.read:
-            explicit = tuple(law.xreplace(self._derived) for law in laws)
+            explicit = tuple(in_full(law.xreplace(self._derived)) for law in laws)
             symbols = frozenset().union(*(law.free_symbols for law in explicit))
             self.read[laws] = explicit, tuple(symbol for symbol in self._symbols if symbol in symbols)
         return self.read[laws]

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 HOLZER_MODES = 3
 """Modes in tables of their own, the lowest."""
 MOST_MODES = 30
-"""Modes in the table, the lowest."""
+"""Modes in the table, the lowest, and resonances: a page."""
 
 
 def frequencies(subject: Subject) -> str:
@@ -64,23 +64,39 @@ def torsional(subject: Subject) -> str:
         return ""
     judged = [name for name, shaft in calculation.items() if shaft.limits is not None]
     subject.figures["torsional"] = calculation.plot(*judged)
-    rows = [
-        tuple(in_text(cell).replace(r"$\mathrm{tau\_c}$", r"$\tau_c$") for cell in row) for row in calculation.table
-    ]
-    heads = ("Shaft", "Torque in kN m", "at 1/min", "Order", r"Stress in N/mm$^2$", r"$\tau_c$", "Verdict")
-    barred = [f"{shaft.shaft}: {one}" for shaft in calculation.values() for one in shaft.barred]
+    rows = [tuple(map(_limits_in_print, row)) for row in calculation.table]
+    heads = tuple(
+        _limits_in_print(head if head.startswith("tau_") else head[:1].upper() + head[1:]) for head in calculation.heads
+    )
     rule = (
-        "The torque is half of peak to peak over a cycle, from all orders with their phases. Stresses are nominal; "
-        "permitted ones are those of IACS UR M68."
+        "Each row is at the speed that governs the shaft: of the largest stress over tau_c or, without a limit, of the "
+        "largest torque. Torques and stresses are half of peak to peak over a cycle, from all orders with their "
+        "phases. Stresses are nominal; permitted ones are those of IACS UR M68."
     )
     return paragraphs(
-        in_text(f"{calculation.heading}. {rule}"),
-        columns(heads, rows, (4, 2.5, 2.5, 1.6, 2.5, 2, 4)),
-        listed(barred),
+        _limits_in_print(f"{calculation.heading}. {rule}"),
+        columns(heads, rows, (3, *(1.5 for _ in heads[2:]), 4)),
+        _with_letters(listed(tuple(map(_with_squares, calculation.notes)))),
         picture("torsional", "Vibratory stress or torque over the speed, with the permitted stresses"),
+        _resonances(calculation),
         *map(_holzer, calculation.modes[:HOLZER_MODES]),
         _heat(calculation),
     )
+
+
+def _limits_in_print(text: str) -> str:
+    """A text of the calculation with the letters of the rule as formulas."""
+    return _with_letters(in_text(_with_squares(text)))
+
+
+def _with_squares(text: str) -> str:
+    return text.replace("mm^2", "mm²")
+
+
+def _with_letters(latex: str) -> str:
+    for limit in ("c", "t"):
+        latex = latex.replace(rf"$\mathrm{{tau\_{limit}}}$", rf"$\tau_{limit}$")
+    return latex
 
 
 def _holzer(mode: Any) -> str:
@@ -98,12 +114,26 @@ def _holzer(mode: Any) -> str:
     )
 
 
+def _resonances(calculation: Any) -> str:
+    """Where excited orders meet natural frequencies, from the lowest speed on."""
+    rows = [
+        (
+            number(one.speed * 30 / math.pi),
+            number(one.order),
+            in_text(one.mode),
+            number(one.frequency),
+            number(one.damping),
+        )
+        for one in calculation.resonances[:MOST_MODES]
+    ]
+    heads = ("Resonance at 1/min", "Order", "Mode", "Frequency in Hz", "Damping ratio")
+    return columns(heads, rows, (3, 2, 3, 3, 3))
+
+
 def _heat(calculation: Any) -> str:
     """What parts turn into heat, at the speed at which each does most."""
-    most = {part: float(power.max()) for part, power in calculation.power_lost.items()}
-    least = 1e-6 * max(most.values(), default=0.0)  # the rest is rounding
-    rows = [(breakable(part), number(power)) for part, power in most.items() if power > least]
-    return columns(("Heat of the vibration in", "W, at most"), rows, (3, 2))
+    rows = [(breakable(part), number(power), number(speed * 30 / math.pi)) for part, power, speed in calculation.heat]
+    return columns(("Heat of the vibration in", "W, at most", "at 1/min"), rows, (3, 2, 2))
 
 
 def shaft_models(subject: Subject) -> str:

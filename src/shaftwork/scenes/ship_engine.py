@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from shaftwork.components.excitations import Harmonics, HarmonicTorque
+from shaftwork.components.excitations import HarmonicTorque
+from shaftwork.components.harmonics import Harmonics
 from shaftwork.components.laws import omega
 from shaftwork.components.mechanics import Damper, Inertia, Spring
 from shaftwork.components.shaft_models import Lumped, ShaftModel
@@ -21,7 +22,7 @@ ORDERS = tuple(k / 2 for k in range(1, 13))
 SINES_COMPRESSION = (183e3, 457e3, 377e3, 389e3, 328e3, 274e3, 226e3, 187e3, 154e3, 124e3, 99e3, 78e3)
 SINES = (253e3, 413e3, 443e3, 371e3, 264e3, 181e3, 135e3, 109e3, 78e3, 38e3, 2e3, -16e3)
 COSINES = (527e3, 339e3, 124e3, -37e3, -112e3, -125e3, -118e3, -120e3, -130e3, -131e3, -112e3, -84e3)
-THROW, CRANK, CYLINDER_DAMPING = 2.0, 4.0e6, 4.0  # kg m2, N m/rad, N m s
+THROW, CRANK, CYLINDER_DAMPING = 2.0, 4.0e6, 4.0  # kg m2 with half of the piston, N m/rad, N m s
 CRANK_DAMPING = 2e-5  # s, of each crank over its stiffness
 RING, VISCOUS_DAMPER = 2.0, 400.0  # kg m2, N m s: the ring of the damper at the free end, and the oil between
 FLYWHEEL, PROPELLER, BLADES = 45.0, 38.0, 4  # kg m2, kg m2 with entrained water
@@ -56,9 +57,12 @@ def ship_engine(
         # the mean torque drives the propeller and what rubs in the engine
         mean = TORQUE * speed**2 / len(angles) + CYLINDER_DAMPING * speed * RATED_SPEED * math.pi / 30
         torques = (("combustion", combustion, mean), ("compression", compression, 0.0), ("piston", masses, 0.0))
-        for name, harmonics, steady in torques:
-            part = HarmonicTorque(f"{name} {k}", harmonics=harmonics, mean=steady, firing_angle=angle)
-            net.add(part, throw)
+        for letter, (name, harmonics, steady) in zip("gzm", torques, strict=True):
+            symbol = f"{letter}{k}"
+            net.add(
+                HarmonicTorque(f"{name} {k}", harmonics=harmonics, mean=steady, firing_angle=angle, symbol=symbol),
+                throw,
+            )
         net.add(Inertia(throw, J=THROW, symbol=f"{k}"), throw)
         net.add(Damper(f"friction {k}", d=CYLINDER_DAMPING, symbol=f"{k}"), throw)
         behind = f"throw {k + 1}" if k < len(angles) else "flywheel"

@@ -9,11 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from shaftwork.numerics.tolerances import TYPED
 from shaftwork.results.observer import RPM, Array
-from shaftwork.torsional.shaft_sections import TRANSIENT
-
-REFINED = 1e-9
-"""To this fraction the speed is found at which a stress passes a limit."""
+from shaftwork.torsional.shaft_sections import MPA, TRANSIENT
 
 
 @dataclass(frozen=True)
@@ -43,10 +41,12 @@ class BarredRange:
 
     def __str__(self) -> str:
         about = ", ".join(f"{speed * RPM:.5g}" for speed in self.critical)
-        verdict = "to be barred and passed quickly" if self.allowed else "NOT permitted"
+        why = "above tau_t" if self.share > 1 else f"up to {TRANSIENT:g} of the rated speed or more"
+        verdict = "to be barred and passed quickly" if self.allowed else f"NOT permitted, as it is {why}"
+        size = f"{self.stress / MPA:.4g} N/mm^2, {100 * self.share:.4g} % of tau_t"
         return (
             f"{self.start * RPM:.5g} to {self.end * RPM:.5g} 1/min (critical {about}): {verdict}, "
-            f"{100 * self.share:.4g} % of tau_t"
+            f"{size if np.isfinite(self.stress) else 'without bound'}"
         )
 
 
@@ -64,7 +64,7 @@ def barred_ranges(
     """
     lasting, passing = limits
     exceeding = stress > lasting
-    found = []
+    ranges = []
     for first, last in _runs(exceeding):
         start, end = _crossing(speeds, first - 1, above), _crossing(speeds, last, above)
         inside = np.arange(first, last + 1, dtype=np.intp)
@@ -73,12 +73,21 @@ def barred_ranges(
         low = min([start, *(16 * critical / (18 - ratio)).tolist()])
         high = max([end, *((18 - ratio) * critical / 16).tolist()])
         share = float((stress[inside] / passing[inside]).max())
-        found.append(
+        ranges.append(
             BarredRange(
                 low, high, ((start, end),), tuple(critical.tolist()), float(stress[inside].max()), share, allowed=True
             )
         )
-    return tuple(_judged(one, rated) for one in _merged(found))
+    return tuple(_judged(one, rated) for one in _merged(ranges))
+
+
+def exceeded_spans(
+    speeds: Array, values: Array, limits: Array, above: Callable[[float], float]
+) -> tuple[tuple[float, float], ...]:
+    """From and to which speed in rad/s values are above their limits; arguments as of `barred_ranges`."""
+    return tuple(
+        (_crossing(speeds, first - 1, above), _crossing(speeds, last, above)) for first, last in _runs(values > limits)
+    )
 
 
 def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
@@ -97,7 +106,7 @@ def _crossing(speeds: Array, place: int, above: Callable[[float], float]) -> flo
     ends = above(low), above(high)
     if not np.isfinite(ends).all() or ends[0] * ends[1] >= 0:  # a limit that jumps, or a stress without bound
         return low if ends[0] > 0 else high
-    return float(brentq(above, low, high, rtol=REFINED))
+    return float(brentq(above, low, high, rtol=TYPED))
 
 
 def _is_peak(stress: Array, places: NDArray[np.intp]) -> NDArray[np.bool_]:

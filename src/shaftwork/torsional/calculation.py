@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import reprlib
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
@@ -13,20 +14,19 @@ from shaftwork.components.mechanics import Spring
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
+from shaftwork.numerics.tolerances import TYPED
 from shaftwork.pipeline.arguments import Point, Time, repeated, several
 from shaftwork.pipeline.network import Network, network_of
 from shaftwork.results.observer import Array, array_in_si
-from shaftwork.torsional.barred_ranges import BarredRange, barred_ranges
+from shaftwork.torsional.barred_ranges import BarredRange, barred_ranges, exceeded_spans
 from shaftwork.torsional.order_excitations import Misfire
 from shaftwork.torsional.shaft_sections import Section
 from shaftwork.torsional.shaft_vibration import ShaftVibration, worst_along
 from shaftwork.torsional.torsional_result import TorsionalCalculation
+from shaftwork.torsional.undamped_resonances import without_bound
 
 if TYPE_CHECKING:
     from shaftwork.torsional.forced_train import ForcedTrain
-
-NEAREST = 1e-7
-"""Speeds that differ by less than this fraction are one."""
 
 
 def torsional_calculation(
@@ -36,6 +36,7 @@ def torsional_calculation(
     sections: Sequence[Section] = (),
     rated: Any = None,
     misfire: Misfire = None,
+    permissible: Mapping[str, Any] | None = None,
     at: Point | Callable[[float], Point] = None,
     exact: bool = False,
     t: Time = None,
@@ -54,6 +55,8 @@ def torsional_calculation(
         rated: maximum continuous speed of the reference shaft, rad/s; needed where a section has a design.
         misfire: the name of a cylinder without swing, or several; or by name a share of the swing, or the `Harmonics`
             that it has then (compression without injection).
+        permissible: by spring or shaft the vibratory torque in N m that may last: of an elastic coupling, a gear or a
+            crank, as its maker gives it.
         at: the point about which the train swings, as for `Model.linearize`, or a function from the speed to it; by
             default the whole train turns with the reference shaft.
         exact: every shaft but a rigid one and one spring is taken as it is, without a mesh.
@@ -65,29 +68,26 @@ def torsional_calculation(
     """
     from shaftwork.torsional.forced_train import forced_train
 
-    given = _ascending(speeds)
+    rising = _ascending(speeds)
     train = forced_train(network_of(net), misfire, at, exact=exact, t=t)
     shafts = _torques_of(train.network)
-    known = _completed(several("sections", sections), net, shafts)
+    of_shafts = _completed(several("sections", sections), net, shafts)
+    bounds = _permissible({} if permissible is None else permissible, shafts)
     top = None if rated is None else in_si("rated", rated, "rad/s", above=0)
-    if top is None and (bare := [one.shaft for one in known.values() if one.design is not None]):
+    if top is None and (bare := [one.shaft for one in of_shafts.values() if one.design is not None]):
         raise ParameterError(
             f"The section of '{bare[0]}' has a design, whose permitted stress depends on the rated speed. Give rated=, "
             "the maximum continuous speed in rad/s."
         )
-    resonances = train.resonances(given)
-    n = _refined(given, [(one.speed, one.damping) for one in resonances])
+    resonances = train.resonances(rising)
+    n = _refined(rising, [(one.speed, one.damping) for one in resonances])
     amplitudes = train.amplitudes(n, tuple(shafts.values()))
     vibrations: dict[str, ShaftVibration] = {}
     for shaft, torque in shafts.items():
-        torques, places = worst_along(amplitudes[torque], train.orders, train.places(torque))
-        section = known.get(shaft)
-        limits = None if section is None or section.design is None or top is None else section.permitted(n / top)
-        vibration = ShaftVibration(shaft, n, train.orders, torques, places, section, limits)
-        if limits is not None and top is not None:
-            barred = _barred(vibration, train, torque, top)
-            vibration = ShaftVibration(shaft, n, train.orders, torques, places, section, limits, barred)
-        vibrations[shaft] = vibration
+        swings = without_bound(amplitudes[torque], train, n, resonances)
+        torques, places = worst_along(swings, train.orders, train.places(torque))
+        vibration = ShaftVibration(shaft, n, train.orders, torques, places, of_shafts.get(shaft), None)
+        vibrations[shaft] = _judged(vibration, train, torque, top, bounds.get(shaft))
     return TorsionalCalculation(net.name, n, train.orders, vibrations, resonances, top, train.failing, train, shafts)
 
 
@@ -109,6 +109,27 @@ def _torques_of(net: Network) -> dict[str, str]:
     return shafts
 
 
+def _permissible(permissible: Mapping[str, Any], shafts: Mapping[str, str]) -> dict[str, float]:
+    """Permissible torques in N m by shaft.
+
+    Raises:
+        ParameterError: one is not above 0, or of no spring or shaft.
+    """
+    if not isinstance(permissible, Mapping):
+        raise ParameterError(
+            f"permissible = {reprlib.repr(permissible)} must say by shaft what torque may last, {{'coupling': 4000.0}}."
+        )
+    for name in permissible:
+        _refuse_no_shaft("permissible", name, shafts)
+    return {name: in_si(f"permissible['{name}']", torque, "N*m", above=0) for name, torque in permissible.items()}
+
+
+def _refuse_no_shaft(argument: str, name: str, shafts: Mapping[str, str]) -> None:
+    if name not in shafts:
+        close = get_close_matches(str(name), shafts, n=3) or tuple(shafts)[:12]
+        raise ParameterError(f"{argument}: '{name}' is no spring or shaft here. There are: {', '.join(close)}.")
+
+
 def _completed(sections: Sequence[Any], net: Network, shafts: Mapping[str, str]) -> dict[str, Section]:
     """Sections by their shaft, with diameters and bores of shafts where they were left out.
 
@@ -122,9 +143,7 @@ def _completed(sections: Sequence[Any], net: Network, shafts: Mapping[str, str])
     parts = {part.name: part for part in net.parts}
     completed = {}
     for one in sections:
-        if one.shaft not in shafts:
-            close = get_close_matches(one.shaft, shafts, n=3) or tuple(shafts)[:12]
-            raise ParameterError(f"sections: '{one.shaft}' is no spring or shaft here. There are: {', '.join(close)}.")
+        _refuse_no_shaft("sections", one.shaft, shafts)
         part = parts[one.shaft]
         if isinstance(part, Shaft):
             diameter, bore = in_si("diameter", part.diameter, "m"), in_si("bore", part.inner_diameter, "m")
@@ -142,17 +161,38 @@ def _refined(speeds: Array, resonances: Sequence[tuple[float, float]]) -> Array:
 
     beside = [speed * (1 + damping * step) for speed, damping in resonances for step in (SPREAD if damping else (0.0,))]
     n = np.unique(np.concatenate([speeds, [speed for speed in beside if speeds[0] <= speed <= speeds[-1]]]))
-    return np.asarray(n[np.concatenate([[True], np.diff(n) > NEAREST * n[1:]])])
+    return np.asarray(n[np.concatenate([[True], np.diff(n) > TYPED * n[1:]])])
 
 
-def _barred(vibration: ShaftVibration, train: ForcedTrain, torque: str, rated: float) -> tuple[BarredRange, ...]:
-    section, limits = vibration.section, vibration.limits
-    assert section is not None and limits is not None  # noqa: S101, PT018 (asked before)
+def _judged(
+    vibration: ShaftVibration, train: ForcedTrain, torque: str, rated: float | None, permissible: float | None
+) -> ShaftVibration:
+    """The vibration with its limits, and the ranges in which it exceeds them."""
+    section, speeds = vibration.section, vibration.speeds
 
-    def above(speed: float) -> float:
+    def at(speed: float) -> ShaftVibration:
+        """The vibration at one more speed in rad/s."""
         one = np.array([speed])
         torques, _ = worst_along(train.amplitudes(one, (torque,))[torque], train.orders, train.places(torque))
-        stress = ShaftVibration(vibration.shaft, one, train.orders, torques, None, section, None).stress
-        return float(stress[0] - section.permitted(speed / rated)[0])
+        return replace(vibration, speeds=one, torques=torques, places=None)
 
-    return barred_ranges(vibration.speeds, vibration.stress, limits, above, rated)
+    barred: tuple[BarredRange, ...] = ()
+    limits = None
+    if section is not None and section.design is not None and rated is not None:
+        limits = section.permitted(speeds / rated)
+        barred = barred_ranges(
+            speeds,
+            vibration.stress,
+            limits,
+            lambda speed: float(at(speed).stress[0] - section.permitted(speed / rated)[0]),
+            rated,
+        )
+    exceeded: tuple[tuple[float, float], ...] = ()
+    if permissible is not None:
+        exceeded = exceeded_spans(
+            speeds,
+            vibration.amplitude,
+            np.full_like(speeds, permissible),
+            lambda speed: float(at(speed).amplitude[0]) - permissible,
+        )
+    return replace(vibration, limits=limits, barred=barred, permissible=permissible, exceeded=exceeded)

@@ -9,14 +9,12 @@ from typing import TYPE_CHECKING, NamedTuple, overload
 import numpy as np
 
 from shaftwork.core.screen import in_columns
+from shaftwork.numerics.tolerances import TYPED
 from shaftwork.results.observer import Complex
 from shaftwork.torsional.shaft_sections import MPA, Section
 
 if TYPE_CHECKING:
     from shaftwork.frequency.natural_modes import Modes
-
-STILL = 1e-6
-"""The first mass is the measure of a mode unless it moves by less than this fraction of the one that moves most."""
 
 
 class HolzerMass(NamedTuple):
@@ -121,7 +119,7 @@ def holzer_table(modes: Modes, shafts: Mapping[str, str], sections: Sequence[Sec
     inertias = [(name, node) for name, node in modes.slopes.masses if f"{name}.tau" in modes.slopes.units]
     places = list(modes.slopes.nodes)
     inertias.sort(key=lambda one: places.index(one[1]))
-    known = {section.shaft: section for section in sections}
+    of_shafts = {section.shaft: section for section in sections}
     torques = {name: modes.shapes[torque] for name, torque in shafts.items()}
     speeds = [modes.shapes[node] for _, node in inertias]
     forces = [modes.shapes[f"{name}.tau"] for name, _ in inertias]
@@ -129,7 +127,8 @@ def holzer_table(modes: Modes, shafts: Mapping[str, str], sections: Sequence[Sec
     for number in np.flatnonzero(modes.rates.imag > 0).tolist():
         turned = np.array([speed[number] for speed in speeds]) / modes.rates[number]
         size = np.abs(turned)
-        first = 0 if size[0] > STILL * size.max() else int(size.argmax())
+        # a first mass that stands but for rounding is no measure
+        first = 0 if size[0] > TYPED * size.max() else int(size.argmax())
         scale = 1 / turned[first]
         masses = []
         for (name, _), angle, force in zip(inertias, turned, forces, strict=True):
@@ -137,7 +136,7 @@ def holzer_table(modes: Modes, shafts: Mapping[str, str], sections: Sequence[Sec
             # J omega^2 times the angle, as Holzer adds it up; of a damped mode the torque has another phase too
             stiffness = float(abs(force[number] / angle)) if angle else 0.0
             masses.append(HolzerMass(name, amplitude, stiffness * amplitude))
-        passed = [_shaft(name, scale * torque[number], known.get(name)) for name, torque in torques.items()]
+        passed = [_shaft(name, scale * torque[number], of_shafts.get(name)) for name, torque in torques.items()]
         damping, frequency = float(modes.damping[number]), float(modes.frequencies[number])
         measure = inertias[first][0]
         rows.append(HolzerMode(modes.names[number], frequency, damping, measure, tuple(masses), tuple(passed)))

@@ -11,15 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from shaftwork.components.excitations import Harmonics, HarmonicTorque
+from shaftwork.components.excitations import HarmonicTorque
+from shaftwork.components.harmonics import Harmonics
 from shaftwork.components.sources import TorqueSource
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
+from shaftwork.numerics.tolerances import TYPED
 from shaftwork.pipeline.network import Network
 from shaftwork.results.observer import Array, Complex
 
-SAME = 1e-9
-"""Orders of different shafts that differ by less than this fraction are one."""
 Misfire = Mapping[str, float | Harmonics] | str | Sequence[str] | None
 """Cylinders that misfire: names, or by name a share of the swing or other harmonics."""
 
@@ -127,10 +127,10 @@ def with_ratios(excitations: Sequence[OrderExcitation], ratios: Sequence[float])
 
 
 def orders_of(excitations: Sequence[OrderExcitation]) -> tuple[float, ...]:
-    """All orders of the reference shaft, ascending."""
+    """All orders of the reference shaft, ascending; those that differ by the digits of typed ratios alone are one."""
     orders: list[float] = []
     for order in sorted(order for one in excitations for order in one.orders.tolist()):
-        if not orders or order > orders[-1] * (1 + SAME):
+        if not orders or order > orders[-1] * (1 + TYPED):
             orders.append(order)
     return tuple(orders)
 

@@ -14,10 +14,9 @@ from shaftwork.results.observer import Array
 
 MPA = 1e6
 """Pa in 1 N/mm^2, in which the rules are written; diameters there are in mm."""
-TRANSIENT, LAST = 0.8, 1.05
-"""Speeds over the rated one below which a range may be barred and passed, and up to which the rules have limits."""
-STEP = 0.9
-"""Speed over the rated one from which the permissible stress is the same."""
+TRANSIENT, STEP, LAST = 0.8, 0.9, 1.05
+"""Speeds over the rated one, by UR M68: below the first a range may be barred and passed, from the second on the
+permissible stress is the same, and up to the third it is given."""
 
 
 @dataclass(frozen=True)

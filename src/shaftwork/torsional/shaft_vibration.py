@@ -27,6 +27,8 @@ class ShaftVibration:
         section: with its diameter; None where none is given.
         limits: (n,) tau_c and tau_t in Pa; None where the section has no design.
         barred: the ranges in which tau_c is exceeded; empty where it never is, or nothing is known of it.
+        permissible: vibratory torque that the maker of the part permits to last, N m; None where none is given.
+        exceeded: from and to which speed in rad/s the torque is above it; a pair for each such interval.
     """
 
     shaft: str
@@ -37,6 +39,8 @@ class ShaftVibration:
     section: Section | None
     limits: tuple[Array, Array] | None
     barred: tuple[BarredRange, ...] = ()
+    permissible: float | None = None
+    exceeded: tuple[tuple[float, float], ...] = ()
 
     @cached_property
     def amplitude(self) -> Array:
@@ -82,18 +86,42 @@ class ShaftVibration:
         return self.orders[int(self.by_order[self.peak].argmax())]
 
     @property
+    def governing(self) -> int:
+        """The place of the speed that decides: of the largest stress over tau_c, else of the largest torque."""
+        if self.limits is None:
+            return self.peak
+        share = self.stress / self.limits[0]
+        return int(share.argmax()) if share.any() else self.peak
+
+    @property
     def permitted(self) -> bool | None:
-        """Whether it may run: every range above tau_c may be barred. None where no design of the section is given."""
-        return None if self.limits is None else all(one.allowed for one in self.barred)
+        """Whether it may run: every range above tau_c may be barred, and the torque stays below the permissible one.
+
+        None where neither a design of the section nor a permissible torque is given.
+        """
+        judged = [] if self.limits is None else [all(one.allowed for one in self.barred)]
+        judged += [] if self.permissible is None else [not self.exceeded]
+        return all(judged) if judged else None
 
     @property
     def verdict(self) -> str:
         """The same in words."""
-        if self.limits is None:
-            return "no limit given"
-        if not self.barred:
-            return "below tau_c at all speeds"
-        return "with a barred range" if self.permitted else "NOT permitted"
+        verdicts = []
+        if not np.isfinite(self.amplitude).all():
+            verdicts.append("NO BOUND where nothing damps")
+        if self.limits is not None:
+            allowed = "with a barred range" if all(one.allowed for one in self.barred) else "NOT permitted"
+            verdicts.append(allowed if self.barred else "below tau_c at all speeds")
+        if self.permissible is not None:
+            verdicts.append(f"{'ABOVE' if self.exceeded else 'below'} the permissible torque")
+        return ", ".join(verdicts) or "no limit given"
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """The ranges in which it exceeds a limit, a sentence each."""
+        above = [f"{start * RPM:.5g} to {end * RPM:.5g} 1/min" for start, end in self.exceeded]
+        passed = f"{self.shaft}: above its permissible torque from {' and '.join(above)}"
+        return (*(f"{self.shaft}: {one}" for one in self.barred), *([passed] if above else []))
 
     @property
     def _section(self) -> Section:
@@ -105,26 +133,33 @@ class ShaftVibration:
 
     @property
     def row(self) -> tuple[str, ...]:
-        """The shaft in a line of a table: name, torque, speed, order, stress, limit, verdict."""
-        k = self.peak
-        stress, limit = "-", "-"
+        """The shaft in a line of a table, at the governing speed, under `HEADS`; "-" where nothing is given."""
+        k = self.governing
+        order = self.orders[int(self.by_order[k].argmax())]
+        permissible = "-" if self.permissible is None else f"{self.permissible / 1e3:.5g}"
+        stresses = ["-"] * 4
         if self.section is not None:
-            stress = f"{self.stress[k] / MPA:.4g}"
+            at_notch = f"{self.notch_stress[k] / MPA:.4g}" if self.section.scf > 1 else "-"
+            stresses[:2] = f"{self.stress[k] / MPA:.4g}", at_notch
         if self.limits is not None and np.isfinite(self.limits[0][k]):
-            limit = f"{self.limits[0][k] / MPA:.4g}"
-        return (
-            self.shaft,
-            f"{self.amplitude[k] / 1e3:.5g}",
-            f"{self.speeds[k] * RPM:.5g}",
-            f"{self.largest_order:g}",
-            stress,
-            limit,
-            self.verdict,
-        )
+            stresses[2:] = (f"{limit[k] / MPA:.4g}" for limit in self.limits)
+        torque, speed = f"{self.amplitude[k] / 1e3:.5g}", f"{self.speeds[k] * RPM:.5g}"
+        return (self.shaft, torque, speed, f"{order:g}", permissible, *stresses, self.verdict)
 
 
-HEADS = ("shaft", "kN m", "at 1/min", "order", "N/mm^2", "tau_c", "verdict")
-"""Heads of `ShaftVibration.row`."""
+HEADS = (
+    "shaft",
+    "torque kN m",
+    "at 1/min",
+    "order",
+    "permissible kN m",
+    "stress N/mm^2",
+    "at notch N/mm^2",
+    "tau_c N/mm^2",
+    "tau_t N/mm^2",
+    "verdict",
+)
+"""Heads of `ShaftVibration.row`: half of peak to peak of torque and stress."""
 
 
 def worst_along(torques: Complex, orders: tuple[float, ...], places: tuple[float, ...]) -> tuple[Complex, Array | None]:

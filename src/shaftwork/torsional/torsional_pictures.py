@@ -16,11 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-ORDERS = 4
-"""Orders that are drawn: those with the largest amplitudes."""
-ROOM = 1.15
-"""The axis ends so many times above the largest stress, or above the limits where these are nearer."""
-
 
 def picture(title: str, shafts: Sequence[ShaftVibration]) -> Figure:
     """One axis for each shaft, speeds in common.
@@ -44,7 +39,7 @@ def _draw(axis: Axes, shaft: ShaftVibration) -> None:
     together = _shown(scale * shaft.amplitude)
     axis.plot(n, together, color="C0", linewidth=1.6, label="all orders")
     largest = np.argsort(-np.where(np.isfinite(shaft.by_order), shaft.by_order, 0.0).max(axis=0), kind="stable")
-    for k, place in enumerate(sorted(largest[:ORDERS].tolist()), 1):
+    for k, place in enumerate(sorted(largest[:4].tolist()), 1):  # of more a reader cannot tell the lines apart
         axis.plot(
             n,
             _shown(scale * shaft.by_order[:, place]),
@@ -58,10 +53,13 @@ def _draw(axis: Axes, shaft: ShaftVibration) -> None:
             limit = _shown(values / MPA)
             axis.plot(n, limit, style, color="0.3", linewidth=1.2, label=label)
             top = max(top, float(np.nanmax(limit, initial=0.0)))
+    if shaft.permissible is not None:
+        axis.axhline(scale * shaft.permissible, linestyle="-.", color="0.3", linewidth=1.2, label="permissible")
+        top = max(top, scale * shaft.permissible)
     for barred in shaft.barred:
         colour = "0.85" if barred.allowed else "#f4c7c3"
         axis.axvspan(barred.start * RPM, barred.end * RPM, color=colour, zorder=0)
-    axis.set_ylim(0.0, ROOM * top or 1.0)
+    axis.set_ylim(0.0, 1.15 * top or 1.0)  # some room above the largest stress, or the limits
     axis.set_xlim(n[0], n[-1])
     axis.set_ylabel(unit)
     axis.set_title(f"{shaft.shaft}: {shaft.verdict}", loc="left", fontsize=10)

@@ -13,12 +13,15 @@ from shaftwork.core.errors import ParameterError, SignalError, imported
 from shaftwork.core.notebook import html_table
 from shaftwork.core.parameters import in_si
 from shaftwork.core.screen import counted, in_columns
+from shaftwork.numerics.tolerances import TYPED
 from shaftwork.results.fatigue import Damage, SNLine, damage, rainflow
 from shaftwork.results.observer import RPM, Array, Complex
 from shaftwork.torsional.barred_ranges import overlapping
 from shaftwork.torsional.holzer import HolzerTable, holzer_table
-from shaftwork.torsional.order_sums import cycle_of, waveform
+from shaftwork.torsional.order_sums import POINTS, cycle_of, waveform
+from shaftwork.torsional.shaft_sections import LAST
 from shaftwork.torsional.shaft_vibration import HEADS, ShaftVibration, worst_along
+from shaftwork.torsional.undamped_resonances import is_undamped, undamped_note, without_bound
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,9 +29,6 @@ if TYPE_CHECKING:
 
     from shaftwork.frequency.campbell import Campbell
     from shaftwork.torsional.forced_train import ForcedTrain, Resonance
-
-POINTS = 64
-"""Points of a waveform over a swing of the highest order."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,26 +90,55 @@ class TorsionalCalculation(Mapping[str, ShaftVibration]):
 
     @property
     def permitted(self) -> bool | None:
-        """Whether the train may run with its barred ranges; None where no section has a design."""
+        """Whether the train may run with its barred ranges; None where no shaft has a limit."""
         judged = [one.permitted for one in self.shafts.values() if one.permitted is not None]
         return all(judged) if judged else None
 
     @property
+    def heads(self) -> tuple[str, ...]:
+        """Heads of `table`, with their units."""
+        return self._filled[0]
+
+    @property
     def table(self) -> tuple[tuple[str, ...], ...]:
-        """By shaft: name, largest vibratory torque in kN m, its speed in 1/min, main order, stress, tau_c, verdict."""
-        return tuple(one.row for one in self.shafts.values())
+        """By shaft, at the speed that governs it: vibratory torque, speed, main order, stresses, limits, verdict.
+
+        Torque and stress are half of peak to peak. The speed is that at which the stress is the largest part of tau_c;
+        without a limit, that of the largest torque. Columns in which no shaft has anything are left out.
+        """
+        return self._filled[1:]
+
+    @cached_property
+    def _filled(self) -> tuple[tuple[str, ...], ...]:
+        rows = [HEADS, *(one.row for one in self.shafts.values())]
+        columns = [column for column in zip(*rows, strict=True) if {*column[1:]} != {"-"}]
+        return tuple(zip(*columns, strict=True))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is said beside the table: ranges above limits, speeds not looked at, resonances without damping."""
+        notes = [note for one in self.shafts.values() for note in one.notes]
+        judged = self.rated is not None and any(one.limits is not None for one in self.shafts.values())
+        if judged and self.rated is not None and self.speeds[-1] < LAST * self.rated * (1 - TYPED):
+            notes.append(
+                f"The speeds end at {self.speeds[-1] * RPM:.5g} 1/min, and the rule asks for those up to "
+                f"{LAST * self.rated * RPM:.5g} 1/min, {LAST:g} of the rated one. Give speeds up to there."
+            )
+        return (*notes, *filter(None, (undamped_note(self.undamped, self.train.network, self.torques),)))
+
+    @property
+    def undamped(self) -> tuple[Resonance, ...]:
+        """Resonances that nothing damps, where torques have no bound in a linear calculation."""
+        return tuple(filter(is_undamped, self.resonances))
 
     def __str__(self) -> str:
-        lines = [self.heading, *in_columns([HEADS, *self.table])]
-        lines += [f"{one.shaft}: {barred}" for one in self.shafts.values() for barred in one.barred]
-        return "\n".join(lines)
+        return "\n".join([self.heading, *in_columns([self.heads, *self.table]), *self.notes])
 
     def __repr__(self) -> str:
         return str(self)
 
     def _repr_html_(self) -> str:
-        barred = [f"{one.shaft}: {barred}" for one in self.shafts.values() for barred in one.barred]
-        return html_table(self.heading, HEADS, self.table, "; ".join(barred))
+        return html_table(self.heading, self.heads, self.table, " ".join(self.notes))
 
     def orders_of(self, name: str) -> Complex:
         """(n, k) complex amplitudes of any quantity, "flywheel.omega", in every order; along a shaft (n, k, places).
@@ -158,9 +187,14 @@ class TorsionalCalculation(Mapping[str, ShaftVibration]):
         amplitudes = self.train.amplitudes(n, (quantity,))[quantity]
         if name not in self.torques and amplitudes.ndim > 2:
             raise SignalError(f"'{name}' is read along a part. Name the shaft, '{name.rpartition('.')[0]}'.")
+        if name in self.torques:
+            amplitudes = without_bound(amplitudes, self.train, n, self.resonances)
         parts = np.asarray(worst_along(amplitudes, self.orders, self.train.places(quantity))[0][0])
         if not np.isfinite(parts).all():
-            raise ParameterError(f"'{name}' has no bound at {n[0]:g} rad/s: an undamped resonance. Add damping.")
+            raise ParameterError(
+                f"'{name}' has no bound at {n[0]:g} rad/s ({n[0] * RPM:.5g} 1/min). "
+                f"{undamped_note(self.undamped, self.train.network, self.torques) or 'Add damping.'}"
+            )
         return parts
 
     def damage(self, shaft: str, sn: SNLine, speed: Any, mean: float = 0.0) -> Damage:
@@ -195,11 +229,22 @@ class TorsionalCalculation(Mapping[str, ShaftVibration]):
 
     @cached_property
     def modes(self) -> HolzerTable:
-        """The modes up to the highest excitation as Holzer tables, about the point of the highest speed."""
-        top = max(self.orders) * float(self.speeds[-1]) / (2 * np.pi)
+        """The modes up to the highest excitation as Holzer tables.
+
+        Where they depend on the speed, they are those about the operating point of the highest speed, which the title
+        says; `train.modes(speed, f_max)` has those about another.
+        """
+        speed = float(self.speeds[-1])
+        top = max(self.orders) * speed / (2 * np.pi)
         sections = [one.section for one in self.shafts.values() if one.section is not None]
-        found = holzer_table(self.train.modes(float(self.speeds[-1]), top), self.torques, sections)
-        return HolzerTable(found.title, tuple(mode for mode in found.modes if mode.frequency <= top))
+        holzer = holzer_table(self.train.modes(speed, top), self.torques, sections)
+        about = (
+            f"about its operating point at {speed * RPM:.5g} 1/min, the highest speed"
+            if callable(self.train.at)
+            else "the same at all speeds"
+        )
+        title = f"Modes of '{self.title}' up to {top:.5g} Hz, {about}"
+        return HolzerTable(title, tuple(mode for mode in holzer.modes if mode.frequency <= top))
 
     def campbell(self, orders: Any = None, f_max: float | None = None) -> Campbell:
         """Natural frequencies at the operating point of each speed, with the excited orders.
@@ -244,6 +289,15 @@ class TorsionalCalculation(Mapping[str, ShaftVibration]):
             for (name, speed), torques in zip(speeds.items(), table, strict=True)
         }
 
+    @property
+    def heat(self) -> tuple[tuple[str, float, float], ...]:
+        """Parts that turn vibration into heat, the most first: name, largest mean power in W, its speed in rad/s."""
+        most = [
+            (part, float(power.max()), float(self.speeds[power.argmax()])) for part, power in self.power_lost.items()
+        ]
+        least = TYPED * max((power for _, power, _ in most), default=0.0)  # the rest is rounding
+        return tuple(sorted((one for one in most if one[1] > least), key=lambda one: -one[1]))
+
     def to_pandas(self) -> pd.DataFrame:
         """A row for each shaft and speed: torques in N m, stresses and limits in Pa (extra `data`).
 
@@ -259,6 +313,8 @@ class TorsionalCalculation(Mapping[str, ShaftVibration]):
                 columns |= {"stress": one.stress, "notch_stress": one.notch_stress}
             if one.limits is not None:
                 columns |= dict(zip(("tau_c", "tau_t"), one.limits, strict=True))
+            if one.permissible is not None:
+                columns["permissible"] = one.permissible
             rows += frames(columns).to_dict("records")
         return frames(rows)
 
@@ -266,7 +322,7 @@ class TorsionalCalculation(Mapping[str, ShaftVibration]):
         """Vibratory stress (or torque, without a section) over speed with its largest orders and limits (extra `plot`).
 
         Args:
-            *shafts: names; by default those with a section, or else all.
+            *shafts: names; by default those with a section or a permissible torque, or else all.
 
         Raises:
             SignalError: there is no such shaft.
@@ -274,7 +330,10 @@ class TorsionalCalculation(Mapping[str, ShaftVibration]):
         """
         from shaftwork.torsional.torsional_pictures import picture
 
-        named = shafts or tuple(name for name, one in self.shafts.items() if one.section is not None)
+        looked_at = (
+            name for name, one in self.shafts.items() if one.section is not None or one.permissible is not None
+        )
+        named = shafts or tuple(looked_at)
         return picture(self.heading, [self[name] for name in named or tuple(self.shafts)])
 
 
