@@ -108,4 +108,11 @@ def _known(folder: Path) -> dict[int, int]:
 def _sums(database: sqlite3.Connection) -> dict[int, int]:
     """A sum over each piece of code and what it was made of."""
     rows = database.execute(f"SELECT {_COLUMNS} FROM cache")  # noqa: S608 (names of our own)
-    return {int(row[0]): zlib.crc32(repr(row).encode()) for row in rows}
+    return {int(row[0]): _sum(row) for row in rows}
+
+
+def _sum(row: tuple[Any, ...]) -> int:
+    total = 0
+    for value in row:  # code as it is: its text would take twenty times as long, a tenth of a second of each process
+        total = zlib.crc32(value if isinstance(value, bytes) else repr(value).encode(), total)
+    return total
