@@ -165,8 +165,7 @@ def make_template(part: Component, values: Mapping[str, Any], choices: Choices =
 
 def _choose(p: Any, modes: tuple[Modes, ...], choices: Choices) -> dict[Symbol, str]:
     """Put the chosen forms and numbers of modes into `p`; symbol and name of the numbers that stay parameters."""
-    firsts = (element.options[0] for element in modes)
-    by_default = tuple(ModeChoice(mode.form, None if choices is None else mode.value) for mode in firsts)
+    by_default = tuple(ModeChoice(m.options[0].form, None if choices is None else m.options[0].value) for m in modes)
     free: dict[Symbol, str] = {}
     for element, choice in zip(modes, choices or by_default, strict=True):
         setattr(p, element.form, choice.form)
