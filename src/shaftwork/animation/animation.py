@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from shaftwork.animation.turning import turning
+from shaftwork.animation.turning import SPEEDS, train_of
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
 from shaftwork.results.observer import Array, PhaseRow, Reader
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 RATE = 20
 """Pictures per second."""
+SAMPLES = 20
+"""Of a speed, from which its angle is integrated, for each picture."""
 MOST_PICTURES = 2000
 FORMATS = (".gif", ".mp4", ".html")
 SWING = 2.0
@@ -126,25 +128,31 @@ def animate(
 ) -> Animation:
     """A motion as a moving picture; arguments as of `Solution.animate`."""
     count = pictures_of(seconds)
+    train = train_of(reader.observer, SPEEDS[:1])
+    if not train.nodes:
+        raise ParameterError(f"Nothing in '{reader.title}' rotates, so there are no discs to show.")
     times = np.linspace(*span, count)
-    discs = turning(reader, times, seconds)
-    figure = new_figure("Solution.animate()", max(6.0, 1.3 * len(discs.discs)), 4.6)
-    train, below = figure.subplots(2, 1, height_ratios=(3, 2))
-    spokes = draw_discs(train, discs.discs)
-    lines = [train.plot([a + RADIUS, b - RADIUS], [0.0, 0.0], linewidth=4.0, zorder=0)[0] for a, b, _ in discs.joints]
-    torques = np.column_stack([reader.quantity(name)(times) for _, _, name in discs.joints] or [np.zeros((count, 0))])
+    fine = np.linspace(*span, SAMPLES * (count - 1) + 1)
+    shown = train.turning(fine, lambda name: reader.quantity(name)(fine), seconds)
+    angles = shown.angles[::SAMPLES]
+    figure = new_figure("Solution.animate()", max(6.0, 1.3 * len(train.nodes)), 4.6)
+    discs, below = figure.subplots(2, 1, height_ratios=(3, 2))
+    spokes = draw_discs(discs, [node.name for node in train.nodes])
+    ends = [(a + RADIUS, b - RADIUS) for a, b in (part.nodes for part in train.joints)]
+    lines = [discs.plot(places, [0.0, 0.0], linewidth=4.0, zorder=0)[0] for places in ends]
+    torques = np.column_stack([reader.quantity(part.torque)(times) for part in train.joints] or [np.zeros((count, 0))])
     largest = np.abs(torques).max(initial=np.finfo(float).tiny)
     for name in names:
         below.plot(*curve(reader, name), linewidth=1.0, label=plain(f"{name} in {reader.unit(name)}"))
     below.set(xlim=span, xlabel="t in s")
     below.legend(loc="upper right", fontsize="small")
     cursor = below.axvline(times[0], color="black", linewidth=0.8)
-    said = f"turning {discs.slowed:.3g} times slower, twists {discs.enlarged:.3g} times larger than they are"
-    title = train.set_title("", fontsize="small")
+    said = f"turning {shown.slowed:g} times slower, twists {shown.enlarged:g} times larger than they are"
+    title = discs.set_title("", fontsize="small")
 
     def draw(number: int) -> None:
         t = times[number]
-        turn_spokes(spokes, discs.angles[number])
+        turn_spokes(spokes, angles[number])
         for line, torque in zip(lines, torques[number], strict=True):
             line.set_color(_colour(torque / largest))
         cursor.set_xdata([t, t])
