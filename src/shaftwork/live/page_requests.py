@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from shaftwork.core.errors import ParameterError
+from shaftwork.core.parameters import in_si
+from shaftwork.live.sliders import StartField
+from shaftwork.network.netlist import Netlist
+from shaftwork.pipeline.arguments import checked_parameter, time_span
 
-WANTED = ("curves", "extremes", "modes", "drawing")
+WANTED = ("curves", "layout", "extremes", "modes", "drawing")
 """What a request may want, from what takes the least time on."""
-FIELDS = {"set": (dict,), "want": (list,), "t_end": (float, int, str), "at": (float, int, type(None))}
+FIELDS = {
+    "set": (dict,),
+    "initial": (dict,),
+    "want": (list,),
+    "t_end": (float, int, str),
+    "at": (float, int, type(None)),
+}
 """What a request may have, and as what; a time that is a text is refused by the library, in its words."""
 
 
@@ -30,3 +40,32 @@ def checked(request: Mapping[str, Any]) -> Mapping[str, Any]:
     if strange := [name for name in whole["want"] if name not in WANTED]:
         raise ParameterError(f"A request wants no {strange[0]!r}. It may want: {', '.join(WANTED)}.")
     return whole
+
+
+def objections(
+    netlist: Netlist, starts: Mapping[str, StartField], request: Mapping[str, Any]
+) -> dict[str, dict[str, str]]:
+    """What the library says to values of a request that cannot be, by field of the request and by name.
+
+    Args:
+        netlist: of the network.
+        starts: what a motion may start with.
+        request: a request with its defaults.
+    """
+
+    def start(name: str, value: Any) -> None:
+        in_si(f"the start value of '{name}'", value, starts[name].unit if name in starts else "1")
+
+    checks: dict[str, tuple[Mapping[str, Any], Callable[[str, Any], Any]]] = {
+        "set": (request["set"], lambda name, value: checked_parameter(netlist, name, value)),
+        "initial": (request.get("initial", {}), start),
+        "t_end": ({"t_end": request["t_end"]} if "t_end" in request else {}, lambda _, end: time_span(0.0, end)),
+    }
+    said: dict[str, dict[str, str]] = {}
+    for field, (values, check) in checks.items():
+        for name, value in values.items():
+            try:
+                check(name, value)
+            except ParameterError as error:
+                said.setdefault(field, {})[name] = str(error)
+    return said

@@ -1,19 +1,25 @@
-"""Sliders: which values of parameters a page offers."""
+"""Sliders and fields: which values of parameters, and which start values, a page offers."""
 
 from __future__ import annotations
 
+import re
+import unicodedata
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
+from shaftwork.core.domains import DOMAINS
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.parameters import Parameter
+from shaftwork.core.parameters import Parameter, in_si
 from shaftwork.pipeline.model import Model
+from shaftwork.results.observer import Observer
 
 SPAN = 4.0
 """A slider goes from the value divided by this factor to the value times it."""
+TWISTS = {"tau_c": "phi_rel", "f_c": "s_rel"}
+"""By the elastic torque or force of a spring, which is its state, the twist or stretch that people think in."""
 
 
 @dataclass(frozen=True)
@@ -22,8 +28,10 @@ class Slider:
 
     Args:
         name: "part.parameter".
+        symbol: its letter and subscript.
         meaning: what it is, a few words.
         unit: SI unit.
+        bounds: the admissible range in words; empty where every finite number will do.
         value: of the network.
         low: the value at the left end.
         high: the value at the right end.
@@ -31,8 +39,10 @@ class Slider:
     """
 
     name: str
+    symbol: tuple[str, str]
     meaning: str
     unit: str
+    bounds: str
     value: float
     low: float
     high: float
@@ -69,7 +79,72 @@ def _slider(name: str, declared: Parameter, value: float) -> Slider:
         high = min(high, declared.at_most)
     if declared.whole:
         low, high = max(1.0, float(np.ceil(low))), float(np.floor(high))
-    return Slider(name, declared.meaning, declared.unit, value, low, high, declared.whole)
+    symbol, meaning = _symbol(declared.latex), declared.meaning
+    return Slider(name, symbol, meaning, declared.unit, declared.bounds, value, low, high, declared.whole)
+
+
+@dataclass(frozen=True)
+class StartField:
+    """One start value as a page offers it.
+
+    Args:
+        name: of a speed, twist or angle.
+        symbol: its letter and subscript.
+        unit: SI unit.
+        value: with which the motion starts; None for rest.
+    """
+
+    name: str
+    symbol: tuple[str, str]
+    unit: str
+    value: float | None
+
+    def described(self) -> dict[str, Any]:
+        """As the page takes it."""
+        return asdict(self)
+
+
+def start_fields_of(model: Model, observer: Observer, initial: Mapping[str, float]) -> Mapping[str, StartField]:
+    """A field for every state of a model outside long shafts, of springs their twist, and for all start values given.
+
+    Args:
+        model: the compiled network.
+        observer: of it.
+        initial: start values.
+    """
+    shafts = {name.rpartition(".")[0] for name in observer.profiles}
+    integrals = {domain.integral.name: domain.integral.unit for domain in DOMAINS}
+    fields: dict[str, StartField] = {}
+    for state in (*model.states, *initial):
+        owner, _, quantity = state.rpartition(".")
+        if owner in shafts and state not in initial:
+            continue
+        twist = f"{owner}.{TWISTS.get(quantity, '')}"
+        name = twist if twist in observer.units and state not in initial else state
+        unit = observer.units.get(name) or integrals.get(quantity, "")
+        value = in_si(f"the start value of '{name}'", initial[name], unit or "1") if name in initial else None
+        fields[name] = StartField(name, _symbol(name.rpartition(".")[2]), unit, value)
+    return fields
+
+
+def _symbol(latex: str) -> tuple[str, str]:
+    """Letter and subscript of a symbol in LaTeX, or of a quantity's name: "\\tau_{off}" is τ and off."""
+    letter, _, subscript = re.sub(r"[{}]|\\bar", "", latex).partition("_")
+    return _letters(letter), _letters(subscript.replace("_", ","))
+
+
+def _letters(text: str) -> str:
+    """A text in which words that name Greek letters are these letters."""
+
+    def greek(match: re.Match[str]) -> str:
+        word = match[2]
+        size = "CAPITAL" if word[0].isupper() else "SMALL"
+        try:
+            return unicodedata.lookup(f"GREEK {size} LETTER {word.replace('lambda', 'lamda')}")
+        except KeyError:
+            return word
+
+    return re.sub(r"\\?(var)?([A-Za-z]+)", greek, text)
 
 
 def chosen(sliders: Mapping[str, Slider], names: Any) -> list[Slider]:
