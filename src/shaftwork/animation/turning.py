@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -11,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import cumulative_simpson
 
+from shaftwork.core.errors import SignalError
 from shaftwork.results.observer import Array, Observer
 
 FASTEST = np.pi
@@ -84,9 +86,9 @@ class Train:
         differences = np.zeros((len(self.joints), len(self.nodes)))
         for row, part in zip(differences, self.joints, strict=True):
             row[part.nodes[0]], row[part.nodes[1]] = 1.0, -1.0
-        return differences, np.linalg.pinv(differences)
+        return differences, np.asarray(np.linalg.pinv(differences), dtype=float)
 
-    def turning(self, times: Array, read: Callable[[str], Array | None], shown_seconds: float) -> Turning:
+    def turning(self, times: Array, read: Callable[[str], Array], shown_seconds: float) -> Turning:
         """The angles of a motion as they are shown.
 
         Law: with the differences D over the joints, nodes that joints connect turn together by the mean of their
@@ -95,7 +97,7 @@ class Train:
 
         Args:
             times: (k,) ascending, s.
-            read: a quantity at these times, or None where the motion has none of that name.
+            read: a quantity at these times.
             shown_seconds: how long they are shown.
         """
         differences, inverse = self._twisting
@@ -103,8 +105,9 @@ class Train:
         true = cumulative_simpson(speeds, x=times, axis=0, initial=0.0)
         twists = true @ differences.T
         for column, part in enumerate(self.joints):  # integrals of two speeds drift apart, and begin at zero
-            if part.twist and (twist := read(part.twist)) is not None:
-                twists[:, column] = twist
+            if part.twist:
+                with suppress(SignalError):  # a spring whose stiffness was set to zero has none
+                    twists[:, column] = read(part.twist)
         apart = twists @ inverse.T
         mean = true - true @ (inverse @ differences).T
         fastest = np.abs(np.diff(mean, axis=0)).max() / (shown_seconds / len(times))

@@ -7,7 +7,7 @@ import time
 import warnings
 from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -141,8 +141,8 @@ class Session:
             "title": self.title,
             "source": self.scene.source if self.scene else "",
             "t_end": self.t_end,
-            "sliders": [slider.described() for slider in self.sliders.values()],
-            "starts": [field.described() for field in self.starts.values()],
+            "sliders": [asdict(slider) for slider in self.sliders.values()],
+            "starts": [asdict(field) for field in self.starts.values()],
         }
 
     def drawing(self, values: Mapping[str, Any]) -> str:
@@ -226,7 +226,9 @@ class Session:
             )
         except SimulationError as error:
             if f"{MOST_STEPS} steps were not enough" in str(error):  # the next step is another one than in a program
-                raise SimulationError(f"{str(error).partition(': ')[0]}: {LIMITS}. {ADVICE}") from None
+                raise SimulationError(
+                    f"The motion has not come to its end at t = {t_end:g} s: {LIMITS}. {ADVICE}"
+                ) from None
             raise
         watched = WatchedSolution.of(motion, self._go_on)
         self._last = key, watched
@@ -256,8 +258,7 @@ class Session:
         if not self._train.nodes:
             return None
         lasting = min(LONGEST, max(SHORTEST, float(motion.t[-1] - motion.t[0])))
-        # a spring without stiffness has no twist that is read
-        turning = self._train.turning(motion.t, lambda name: motion[name] if name in motion else None, lasting)
+        turning = self._train.turning(motion.t, motion.__getitem__, lasting)
         return {
             "seconds": lasting,
             "slowed": turning.slowed,

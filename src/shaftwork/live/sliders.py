@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from shaftwork.core.domains import DOMAINS
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import Parameter, in_si
+from shaftwork.equations.spelling import GREEK
 from shaftwork.pipeline.model import Model
 from shaftwork.results.observer import Observer
 
@@ -20,6 +21,7 @@ SPAN = 4.0
 """A slider goes from the value divided by this factor to the value times it."""
 TWISTS = {"tau_c": "phi_rel", "f_c": "s_rel"}
 """By the elastic torque or force of a spring, which is its state, the twist or stretch that people think in."""
+_GREEK = re.compile(rf"\\?(?:var)?({'|'.join(GREEK)})(?![A-Za-z])")
 
 
 @dataclass(frozen=True)
@@ -55,10 +57,6 @@ class Slider:
         values = np.unique(np.concatenate([*spread, [self.value]]))
         exact = np.where(np.isclose(values, self.value, rtol=1e-12), self.value, values)
         return [float(value) for value in np.unique(np.rint(exact) if self.whole else exact)]
-
-    def described(self) -> dict[str, Any]:
-        """As the page takes it."""
-        return asdict(self)
 
 
 def sliders_of(model: Model) -> Mapping[str, Slider]:
@@ -99,10 +97,6 @@ class StartField:
     unit: str
     value: float | None
 
-    def described(self) -> dict[str, Any]:
-        """As the page takes it."""
-        return asdict(self)
-
 
 def start_fields_of(model: Model, observer: Observer, initial: Mapping[str, float]) -> Mapping[str, StartField]:
     """A field for every state of a model outside long shafts, of springs their twist, and for all start values given.
@@ -128,23 +122,14 @@ def start_fields_of(model: Model, observer: Observer, initial: Mapping[str, floa
 
 
 def _symbol(latex: str) -> tuple[str, str]:
-    """Letter and subscript of a symbol in LaTeX, or of a quantity's name: "\\tau_{off}" is τ and off."""
-    letter, _, subscript = re.sub(r"[{}]|\\bar", "", latex).partition("_")
-    return _letters(letter), _letters(subscript.replace("_", ","))
+    """Letter and subscript of a symbol in LaTeX, or of a quantity's name: of "tau_off" τ and off."""
+    letter, _, subscript = _GREEK.sub(_letter, re.sub(r"[{}]|\\bar", "", latex)).partition("_")
+    return letter, subscript.replace("_", ",")
 
 
-def _letters(text: str) -> str:
-    """A text in which words that name Greek letters are these letters."""
-
-    def greek(match: re.Match[str]) -> str:
-        word = match[2]
-        size = "CAPITAL" if word[0].isupper() else "SMALL"
-        try:
-            return unicodedata.lookup(f"GREEK {size} LETTER {word.replace('lambda', 'lamda')}")
-        except KeyError:
-            return word
-
-    return re.sub(r"\\?(var)?([A-Za-z]+)", greek, text)
+def _letter(match: re.Match[str]) -> str:
+    size = "CAPITAL" if match[1][0].isupper() else "SMALL"
+    return unicodedata.lookup(f"GREEK {size} LETTER {match[1].replace('ambda', 'amda')}")
 
 
 def chosen(sliders: Mapping[str, Slider], names: Any) -> list[Slider]:
