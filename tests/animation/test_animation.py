@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.font_manager import findfont
+from matplotlib.ft2font import FT2Font
 from PIL import Image
 
 import shaftwork as sw
@@ -125,3 +127,35 @@ def test_notebooks_show_tables_and_no_markup_of_names(made: str) -> None:
         "sweep": lambda: sw.studies.sweep(net, {"J.J": [1.0, 2.0]}, t_end=1.0, measures=["max J.omega"]),
     }[made]()
     assert "a &lt;b&gt; &amp; c" in shown._repr_html_()
+
+
+def named(letters: str) -> sw.Network:
+    net = sw.Network(f"{letters} drive")
+    net.add(sw.TorqueSource("motor", tau=10.0), f"rotor {letters}")
+    net.add(sw.Inertia("J1", J=2.0), f"rotor {letters}")
+    net.add(sw.Spring(letters, c=100.0, d=1.0), f"rotor {letters}", "wheel")
+    net.add(sw.Inertia("J2", J=3.0), "wheel")
+    return net
+
+
+def test_letters_that_no_installed_font_has_are_their_numbers(tmp_path: Path) -> None:
+    """Nothing warns of boxes; U+3106C is so rare that no usual font has it."""
+    net = named("\U0003106c")
+    moving = net.simulate(1.0).animate("\U0003106c.tau", seconds=0.1)
+    moving.save(tmp_path / "train.gif")
+    assert [text.get_text() for text in moving.figure.axes[0].texts] == ["rotor U+3106C", "wheel"]
+    assert moving.figure.axes[0].get_title().startswith("U+3106C drive, t = ")
+    swinging = net.modes().animate(1, seconds=0.1)
+    swinging.save(tmp_path / "mode.gif")
+    assert "U+3106C drive" in swinging.figure.get_suptitle()
+
+
+def test_letters_are_drawn_in_an_installed_font_that_has_them(tmp_path: Path) -> None:
+    """STIX comes with matplotlib as DejaVu does; the letter is one that it has besides."""
+    there = {name: FT2Font(findfont(name)).get_charmap().keys() for name in ("STIXGeneral", "DejaVu Sans")}
+    letter = next(chr(k) for k in sorted(there["STIXGeneral"] - there["DejaVu Sans"]) if chr(k).isprintable())
+    moving = named(letter).simulate(1.0).animate(seconds=0.1)
+    moving.save(tmp_path / "train.gif")
+    name = moving.figure.axes[0].texts[0]
+    assert name.get_text() == f"rotor {letter}"
+    assert "DejaVu Sans" in name.get_fontfamily() != ["DejaVu Sans"]

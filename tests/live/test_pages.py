@@ -145,6 +145,7 @@ def test_a_value_that_cannot_be_shows_the_sentence_of_the_library_and_the_last_g
         assert page.locator("#message").is_hidden()
         assert field.get_attribute("aria-invalid") == "true"
         assert curve(page, "J1.omega") == before
+    page.click("text=Start of the motion")
     enter(page, "J1.omega", "fast")
     page.wait_for_function(
         SAID, arg=["J1.omega", "the start value of 'J1.omega' = 'fast' must be a number, not str 'fast'."]

@@ -225,7 +225,7 @@ def test_angles_that_are_given_or_drawn_are_recorded() -> None:
 def test_the_work_on_an_answer_has_limits_that_it_names(monkeypatch: pytest.MonkeyPatch) -> None:
     session = Session(SCENES["crane-start"])
     assert session.answer({"t_end": 1e9}) == {
-        "error": "The motion has not come to its end at t = 1e+09 s: 100000 steps and 60 s are the most that an answer "
+        "error": "The motion has not come to its end at t = 1e+09 s: 100000 steps and 120 s are the most that an answer "
         "of a page takes. Let the motion end earlier on the page, or compute it with simulate."
     }
     monkeypatch.setattr("shaftwork.live.work.LONGEST", 0.0)

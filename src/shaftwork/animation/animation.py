@@ -17,6 +17,7 @@ import numpy as np
 from shaftwork.animation.turning import SPEEDS, train_of
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
+from shaftwork.results.lettering import lettered, replaced
 from shaftwork.results.observer import Array, PhaseRow, Reader
 from shaftwork.results.plotting import curve, new_figure, plain
 
@@ -143,7 +144,7 @@ def animate(
     torques = np.column_stack([reader.quantity(part.torque)(times) for part in train.joints] or [np.zeros((count, 0))])
     largest = np.abs(torques).max(initial=np.finfo(float).tiny)
     for name in names:
-        below.plot(*curve(reader, name), linewidth=1.0, label=plain(f"{name} in {reader.unit(name)}"))
+        below.plot(*curve(reader, name), linewidth=1.0, label=_written(f"{name} in {reader.unit(name)}"))
     below.set(xlim=span, xlabel="t in s")
     below.legend(loc="upper right", fontsize="small")
     cursor = below.axvline(times[0], color="black", linewidth=0.8)
@@ -157,9 +158,10 @@ def animate(
             line.set_color(_colour(torque / largest))
         cursor.set_xdata([t, t])
         phase = next((row.name for row in phases if row.start <= t <= row.end), "")
-        title.set_text(plain("\n".join((f"{reader.title}, t = {t:.3f} s", said, phase))))
+        title.set_text(_written("\n".join((f"{reader.title}, t = {t:.3f} s", said, phase))))
 
     draw(0)
+    lettered(figure)
     return Animation(figure, count, draw)
 
 
@@ -177,7 +179,7 @@ def swinging(title: str, shapes: Mapping[str, complex], seconds: float) -> Anima
     if not shapes:
         raise ParameterError(f"{title}: nothing rotates in it, so there are no discs to show.")
     count = pictures_of(seconds)
-    figure = new_figure("Modes.animate()", max(6.0, 1.3 * len(shapes)), 2.8, title)
+    figure = new_figure("Modes.animate()", max(6.0, 1.3 * len(shapes)), 2.8, replaced(title))
     spokes = draw_discs(figure.subplots(), tuple(shapes))
     amplitudes = np.array(list(shapes.values()))
     largest = np.abs(amplitudes).max() or 1.0
@@ -188,6 +190,7 @@ def swinging(title: str, shapes: Mapping[str, complex], seconds: float) -> Anima
         turn_spokes(spokes, LARGEST_SWING * turned.real / largest)
 
     draw(0)
+    lettered(figure)
     return Animation(figure, count, draw)
 
 
@@ -209,7 +212,7 @@ def draw_discs(axes: Axes, names: Sequence[str]) -> list[Any]:
 
     for number, name in enumerate(names):
         axes.add_patch(Circle((number, 0.0), RADIUS, facecolor="0.85", edgecolor="0.3"))
-        axes.text(number, -RADIUS - 0.12, plain(name), ha="center", va="top", fontsize="small", rotation=20)
+        axes.text(number, -RADIUS - 0.12, _written(name), ha="center", va="top", fontsize="small", rotation=20)
     axes.set(xlim=(-0.6, len(names) - 0.4), ylim=(-1.0, 0.6), aspect="equal")
     axes.set_axis_off()
     return [axes.plot([], [], color="0.1", linewidth=2.0)[0] for _ in names]
@@ -220,6 +223,11 @@ def turn_spokes(spokes: Sequence[Any], angles: Array) -> None:
     for number, (spoke, angle) in enumerate(zip(spokes, angles.tolist(), strict=True)):
         x, y = RADIUS * np.sin(angle), RADIUS * np.cos(angle)
         spoke.set_data([number - x, number + x], [-y, y])
+
+
+def _written(text: str) -> str:
+    """A text for a picture, in which names are no formulas and every letter can be drawn."""
+    return plain(replaced(text))
 
 
 def _colour(share: float) -> tuple[float, float, float]:

@@ -26,8 +26,12 @@ def described(train: Train, parameters: Collection[str]) -> Mapping[str, Any]:
         train: what is moved.
         parameters: those that can be set, by name.
     """
-    links = [(part.name, part.nodes[0], other) for part in train.parts for other in part.nodes[1:]]
-    columns, rows = _places(len(train.nodes), [(a, b) for _, a, b in links])
+    links = [
+        {"part": part.name, "a": part.nodes[0], "b": other, "twists": bool(part.torque)}
+        for part in train.parts
+        for other in part.nodes[1:]
+    ]
+    columns, rows = _places(len(train.nodes), links)
     inertias: list[list[str]] = [[] for _ in train.nodes]
     for part in train.parts:
         names = (f"{part.name}.{key}" for key in INERTIAS)
@@ -38,16 +42,16 @@ def described(train: Train, parameters: Collection[str]) -> Mapping[str, Any]:
             {"name": node.name, "turns": node.turns, "inertias": inertias[k], "column": columns[k], "row": rows[k]}
             for k, node in enumerate(train.nodes)
         ],
-        "links": [{"part": name, "a": a, "b": b} for name, a, b in links],
+        "links": links,
         "ends": [{"part": part.name, "node": part.nodes[0]} for part in train.parts if len(part.nodes) == 1],
     }
 
 
-def _places(count: int, pairs: Iterable[tuple[int, int]]) -> tuple[list[int], list[int]]:
+def _places(count: int, links: Iterable[Mapping[str, Any]]) -> tuple[list[int], list[int]]:
     """Column and row of each node: as many links from the first node, those of one column below each other."""
     columns, rows = [0] * count, [0] * count
     filled: dict[int, int] = {}
-    for node, column in _depths(count, pairs):
+    for node, column in _depths(count, [(link["a"], link["b"]) for link in links]):
         columns[node], rows[node] = column, filled.get(column, 0)
         filled[column] = rows[node] + 1
     return columns, rows

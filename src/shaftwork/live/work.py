@@ -11,8 +11,8 @@ from shaftwork.core.errors import SimulationError
 from shaftwork.results.observer import Array, Read, Reader
 from shaftwork.results.solution import Solution
 
-LONGEST = 60.0
-"""Of the work on an answer, s. The first one may compile for half of it."""
+LONGEST = 120.0
+"""Of the work on an answer, s; compiling a train of many parts takes a part of the first."""
 MOST_STEPS = 100_000
 """Of a motion: its continuous output takes some 10 kB a step where there are many states."""
 LIMITS = f"{MOST_STEPS} steps and {LONGEST:g} s are the most that an answer of a page takes"

@@ -54,7 +54,10 @@ class Stage {
   /** In words, how it is drawn. */
   get scale() {
     if (!this.shown) return "Nothing turns or slides, or too many nodes for a drawing in motion.";
-    if (this.mode) return `${this.mode.name} swings at ${SWINGS} Hz in place of ${this.mode.frequency.toPrecision(4)} Hz.`;
+    if (this.mode) {
+      const { name, frequency } = this.mode;
+      return frequency ? `${name} swings at ${SWINGS} Hz in place of ${printed(frequency, 4)} Hz.` : `Shape of ${name}, which does not swing.`;
+    }
     const { slowed, enlarged } = this.shown;
     const slow = slowed > 1 ? `turning slowed ${printed(slowed)} times` : "turning as it is";
     return `Drawn with ${slow}, twists ${enlarged > 1 ? `enlarged ${printed(enlarged)} times` : "as they are"}.`;
@@ -100,8 +103,9 @@ class Stage {
     const at = share => ({ x: a.x + share * (b.x - a.x), y: a.y + share * (b.y - a.y) });
     const [one, other] = [angles[link.a], angles[link.b]];
     const middle = (one + other) / 2;
-    this.drawShaft(pen, a, at(near), half, one, open ? one : middle);
-    this.drawShaft(pen, at(far), b, half, open ? other : middle, other);
+    const isApart = open || !link.twists; // each half turns with its end
+    this.drawShaft(pen, a, at(near), half, one, isApart ? one : middle);
+    this.drawShaft(pen, at(far), b, half, isApart ? other : middle, other);
   }
 
   /** The name of a part between two nodes, above all discs of its row; of one between rows, in its middle. */
