@@ -166,6 +166,20 @@ def test_the_stage_has_turning_and_sliding_nodes_in_the_order_of_the_train() -> 
     assert [len(numbers(angle)) for angle in answer["train"]["angles"]] == [POINTS] * len(columns)
 
 
+def test_axes_and_train_are_those_of_the_first_motion_that_there_is() -> None:
+    """The network's own values need give none: a run that fails is an answer, and is mended on the page."""
+    net = sw.Network("root")
+    net.add(sw.TorqueSource("motor", tau=10.0), "rotor")
+    net.add(sw.Inertia("J1", J=2.0), "rotor")
+    net.add(sw.Brake("brake", tau=1.0, t_on=0.1), "rotor")
+    session = Session(net, t_end=1e9)
+    assert "error" in session.answer({"t_end": 1e9, "set": {"brake.tau": -1.0}, "want": ["curves", "layout"]})
+    answer = session.answer({"t_end": 1.0, "want": ["curves", "layout"]})
+    assert answer["layout"]["axes"] == [{"unit": "rad/s", "signals": ["J1.omega"]}]
+    assert session._last is not None
+    assert session._last[1].t[-1] == 1.0  # no other motion was simulated for the layout
+
+
 def test_values_that_cannot_be_are_all_named_with_their_field(crane: Session) -> None:
     """What each field says is what the library says to its value alone."""
     wrong = {"shaft.c": -1.0, "J1.J": "heavy", "motor.efficiency": 1.5}
@@ -225,8 +239,8 @@ def test_angles_that_are_given_or_drawn_are_recorded() -> None:
 def test_the_work_on_an_answer_has_limits_that_it_names(monkeypatch: pytest.MonkeyPatch) -> None:
     session = Session(SCENES["crane-start"])
     assert session.answer({"t_end": 1e9}) == {
-        "error": "The motion has not come to its end at t = 1e+09 s: 100000 steps and 120 s are the most that an answer "
-        "of a page takes. Let the motion end earlier on the page, or compute it with simulate."
+        "error": "The motion has not come to its end at t = 1e+09 s: 100000 steps and 120 s are the most that an "
+        "answer of a page takes. Let the motion end earlier on the page, or compute it with simulate."
     }
     monkeypatch.setattr("shaftwork.live.work.LONGEST", 0.0)
     assert (

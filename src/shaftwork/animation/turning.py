@@ -26,15 +26,11 @@ TWISTS = ("phi_rel", "phi", "s_rel", "s")
 
 
 class TrainNode(NamedTuple):
-    """A node that turns or slides, of name `name`, with the quantity that is its speed."""
+    """A node with the quantity that is its speed, and whether it turns; else it slides."""
 
     name: str
     speed: str
-
-    @property
-    def turns(self) -> bool:
-        """Whether it turns; else it slides."""
-        return self.speed.endswith(SPEEDS[0])
+    turns: bool
 
 
 class TrainPart(NamedTuple):
@@ -132,7 +128,7 @@ def train_of(observer: Observer, speeds: Sequence[str] = SPEEDS) -> Train:
         owner, _, quantity = name.rpartition(".")
         ends = nodes_of(name)
         if quantity in speeds and len(ends) == 1 and ends[0].rpartition(".")[0] not in shafts:
-            nodes.setdefault(ends[0], TrainNode(owner, name))
+            nodes.setdefault(ends[0], TrainNode(owner, name, quantity == SPEEDS[0]))
         if owner in observer.wiring:
             quantities.setdefault(owner, []).append(quantity)
     numbers = {node: number for number, node in enumerate(nodes)}

@@ -45,25 +45,20 @@ def checked(request: Mapping[str, Any]) -> Mapping[str, Any]:
 def objections(
     netlist: Netlist, starts: Mapping[str, StartField], request: Mapping[str, Any]
 ) -> dict[str, dict[str, str]]:
-    """What the library says to values of a request that cannot be, by field of the request and by name.
-
-    Args:
-        netlist: of the network.
-        starts: what a motion may start with.
-        request: a request with its defaults.
-    """
+    """What the library says to values of a request that cannot be, by field of the request and by name."""
 
     def start(name: str, value: Any) -> None:
         in_si(f"the start value of '{name}'", value, starts[name].unit if name in starts else "1")
 
-    checks: dict[str, tuple[Mapping[str, Any], Callable[[str, Any], Any]]] = {
-        "set": (request["set"], lambda name, value: checked_parameter(netlist, name, value)),
-        "initial": (request.get("initial", {}), start),
-        "t_end": ({"t_end": request["t_end"]} if "t_end" in request else {}, lambda _, end: time_span(0.0, end)),
+    checks: dict[str, Callable[[str, Any], Any]] = {
+        "set": lambda name, value: checked_parameter(netlist, name, value),
+        "initial": start,
+        "t_end": lambda _, end: time_span(0.0, end),
     }
+    values = {"initial": {}, **request, "t_end": {key: request[key] for key in ("t_end",) if key in request}}
     said: dict[str, dict[str, str]] = {}
-    for field, (values, check) in checks.items():
-        for name, value in values.items():
+    for field, check in checks.items():
+        for name, value in values[field].items():
             try:
                 check(name, value)
             except ParameterError as error:

@@ -84,8 +84,9 @@ class Session:
         names = dict.fromkeys((*self._observer.units, *self._observer.profiles, *self.model.states))
         for name in self._chosen:
             if name not in names:
-                raise no_quantity(name, self.model.name, names)
+                raise no_quantity(str(name), self.model.name, names)
         self._last: tuple[tuple[Any, ...], Solution] | None = None
+        self._first: Solution | None = None
         self._work = Work(self._is_open)
 
     def _is_open(self) -> bool:
@@ -116,17 +117,17 @@ class Session:
     @cached_property
     def signals(self) -> tuple[str, ...]:
         """The quantities that are drawn."""
-        motion, _ = self._motion({})
+        motion = self._first_motion()
         return self._chosen or tuple(name for name in motion.states if name in motion)[:MOST_SIGNALS]
 
     @cached_property
     def _train(self) -> Train:
-        return moved(train_of(self._motion({})[0].observer))
+        return moved(train_of(self._first_motion().observer))
 
     @cached_property
     def layout(self) -> dict[str, Any]:
         """What stays while values change: the axes of the plot, and the train that the page moves."""
-        motion, _ = self._motion({})
+        motion = self._first_motion()
         units = {name: motion.reader.unit(name) for name in self.signals}
         axes = grouped({name: (motion.t, motion[name]) for name in self.signals}, units)
         return {
@@ -151,9 +152,7 @@ class Session:
         return svg[svg.index("<svg") :]
 
     def answer(self, request: Mapping[str, Any], waits: Callable[[], bool] = lambda: True) -> dict[str, Any]:
-        """What a page shows for values of parameters, as plain data for JSON.
-
-        The work has limits, `work.MOST_STEPS` and `work.LONGEST`, and ends when nobody waits for it any more.
+        """What a page shows for values of parameters, as plain data for JSON; the work has the limits of `Work`.
 
         Args:
             request: "set", values by "part.parameter" in SI, those of the network elsewhere; "initial", start values by
@@ -231,8 +230,12 @@ class Session:
                 ) from None
             raise
         watched = WatchedSolution.of(motion, self._go_on)
-        self._last = key, watched
+        self._last, self._first = (key, watched), self._first or watched
         return watched, time.perf_counter() - start
+
+    def _first_motion(self) -> Solution:
+        """By which is chosen what stays: where the network's own values give no motion, others may."""
+        return self._first or self._motion({})[0]
 
     def _go_on(self, reached: float | None = None) -> None:
         self._work.go_on(reached)

@@ -83,14 +83,7 @@ def _slider(name: str, declared: Parameter, value: float) -> Slider:
 
 @dataclass(frozen=True)
 class StartField:
-    """One start value as a page offers it.
-
-    Args:
-        name: of a speed, twist or angle.
-        symbol: its letter and subscript.
-        unit: SI unit.
-        value: with which the motion starts; None for rest.
-    """
+    """A start value as a page offers it: letter and subscript, SI unit, and the value, None for rest."""
 
     name: str
     symbol: tuple[str, str]
@@ -99,13 +92,7 @@ class StartField:
 
 
 def start_fields_of(model: Model, observer: Observer, initial: Mapping[str, float]) -> Mapping[str, StartField]:
-    """A field for every state of a model outside long shafts, of springs their twist, and for all start values given.
-
-    Args:
-        model: the compiled network.
-        observer: of it.
-        initial: start values.
-    """
+    """A field for every state of a model outside long shafts, of springs their twist, and for start values given."""
     shafts = {name.rpartition(".")[0] for name in observer.profiles}
     integrals = {domain.integral.name: domain.integral.unit for domain in DOMAINS}
     fields: dict[str, StartField] = {}

@@ -20,21 +20,13 @@ ADVICE = "Let the motion end earlier on the page, or compute it with simulate."
 
 
 class Work:
-    """The work on one answer.
-
-    Args:
-        waits: whether anybody still waits for it; asked again and again, from the thread of the work.
-    """
+    """The work on one answer; `waits` says whether anybody still waits for it, from the thread of the work."""
 
     def __init__(self, waits: Callable[[], bool]) -> None:
         self._waits, self._start = waits, time.monotonic()
 
     def go_on(self, reached: float | None = None) -> None:
-        """Raise an error where the work is to end; `reached` is the time in s to which a motion has come.
-
-        Raises:
-            SimulationError: it takes too long, or nobody waits for it.
-        """
+        """Raise a `SimulationError` where the work is to end; `reached` is the time in s to which a motion has come."""
         where = "" if reached is None else f" at t = {reached:g} s of the motion"
         if not self._waits():
             raise SimulationError(f"The work on the answer ended{where}: nobody waits for it any more.")
@@ -43,7 +35,7 @@ class Work:
 
 
 class _WatchedReader(Reader):
-    """A reader that looks before each reading whether the work is to go on."""
+    """Looks before each reading whether the work is to go on."""
 
     go_on: Callable[[], None]
 
@@ -59,11 +51,7 @@ class _WatchedReader(Reader):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class WatchedSolution(Solution):
-    """A motion whose extremes and pictures are read while the work goes on.
-
-    Args:
-        go_on: raises where the work is to end.
-    """
+    """A motion whose extremes and pictures are read while the work goes on: `go_on` raises where it is to end."""
 
     go_on: Callable[[], None]
 
