@@ -5,7 +5,6 @@
 const REST = 150; // ms without a change, after which extremes, frequencies and the drawing follow
 const PATIENCE = 300; // ms after which the page says that it waits
 const TICKS = 500; // of a slider, from its middle to each end
-const ENDED = "The command `shaftwork open` has ended. Start it again to go on.";
 
 const byId = id => document.getElementById(id);
 const setup = JSON.parse(byId("setup").textContent);
@@ -22,7 +21,7 @@ let reference = null; // the one that is kept for comparison
 let extremes = [];
 let modes = [];
 let asked = 0; // questions so far; the last one's number
-let questions = new Map(); // by number, those that may still be answered
+const questions = new Map(); // by number, those that may still be answered
 let resting = 0;
 let waiting = 0;
 let playing = null;
@@ -49,19 +48,19 @@ function numbers(packed) {
 /** Ask the server of this page; what it answers goes to `accept`. */
 function askServer() {
   let line = null;
-  const end = () => {
-    compute(false);
-    say(ENDED);
-    line = null;
-  };
   return question => {
-    const text = JSON.stringify(question);
-    if (line && line.readyState === WebSocket.OPEN) return line.send(text);
-    if (line) return line.addEventListener("open", () => question.number === asked && line.send(text));
-    line = new WebSocket(`ws://${location.host}/answers`);
-    line.onmessage = event => accept(JSON.parse(event.data));
-    line.onclose = end;
-    return line.addEventListener("open", () => question.number === asked && line.send(text));
+    const send = () => question.number === asked && line.send(JSON.stringify(question));
+    if (!line) {
+      line = new WebSocket(`ws://${location.host}/answers`);
+      line.onmessage = event => accept(JSON.parse(event.data));
+      line.onclose = () => {
+        line = null;
+        compute(false);
+        say("The command `shaftwork open` has ended. Start it again to go on.");
+      };
+    }
+    if (line.readyState === WebSocket.OPEN) send();
+    else line.addEventListener("open", send);
   };
 }
 
@@ -128,19 +127,16 @@ function accept(answer) {
 }
 
 /** Say what is wrong beside the fields that it is about, all else on top. */
-function object(answer) {
-  const { set: wrong = {}, initial = {}, t_end: end = {} } = answer.fields || {};
-  for (const [name, { field, wrong: place }] of controls) mark(field, place, wrong[name]);
-  for (const [name, { field, wrong: place }] of startFields) mark(field, place, initial[name]);
-  byId("end").setAttribute("aria-invalid", Boolean(end.t_end));
-  const beside = new Set([...controls.keys()].map(name => wrong[name]).concat([...startFields.keys()].map(name => initial[name])));
-  say((answer.error || "").split("\n").every(text => beside.has(text)) ? "" : answer.error || "");
-}
-
-function mark(field, place, text) {
-  field.setAttribute("aria-invalid", Boolean(text));
-  place.textContent = text || "";
-  place.hidden = !text;
+function object({ error = "", fields: { set: wrong = {}, initial = {}, t_end: end } = {} }) {
+  const rows = [...controls].map(([name, row]) => [row, wrong[name]]).concat([...startFields].map(([name, row]) => [row, initial[name]]));
+  for (const [{ field, wrong: place }, text] of rows) {
+    field.setAttribute("aria-invalid", Boolean(text));
+    place.textContent = text || "";
+    place.hidden = !text;
+  }
+  byId("end").setAttribute("aria-invalid", Boolean(end));
+  const beside = new Set(rows.map(([, text]) => text));
+  say(error.split("\n").filter(line => !beside.has(line)).join("\n"));
 }
 
 function state(text) {
