@@ -148,7 +148,6 @@ def animate(
     below.set(xlim=span, xlabel="t in s")
     below.legend(loc="upper right", fontsize="small")
     cursor = below.axvline(times[0], color="black", linewidth=0.8)
-    said = f"turning {shown.slowed:g} times slower, twists {shown.enlarged:g} times larger than they are"
     title = discs.set_title("", fontsize="small")
 
     def draw(number: int) -> None:
@@ -158,7 +157,7 @@ def animate(
             line.set_color(_colour(torque / largest))
         cursor.set_xdata([t, t])
         phase = next((row.name for row in phases if row.start <= t <= row.end), "")
-        title.set_text(_written("\n".join((f"{reader.title}, t = {t:.3f} s", said, phase))))
+        title.set_text(_written("\n".join((f"{reader.title}, t = {t:.3f} s", shown.words, phase))))
 
     draw(0)
     lettered(figure)

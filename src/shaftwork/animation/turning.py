@@ -63,6 +63,14 @@ class Turning:
     slowed: float
     enlarged: float
 
+    @property
+    def words(self) -> str:
+        """How it is shown."""
+        turning = f"slowed {self.slowed:g} times" if self.slowed > 1 else "as it is"
+        return f"turning {turning}, twists " + (
+            f"enlarged {self.enlarged:g} times" if self.enlarged > 1 else "as they are"
+        )
+
 
 @dataclass(frozen=True)
 class Train:

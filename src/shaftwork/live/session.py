@@ -264,8 +264,7 @@ class Session:
         turning = self._train.turning(motion.t, motion.__getitem__, lasting)
         return {
             "seconds": lasting,
-            "slowed": turning.slowed,
-            "enlarged": turning.enlarged,
+            "words": turning.words,
             "angles": [_doubles(angle) for angle in turning.angles.T],
         }
 

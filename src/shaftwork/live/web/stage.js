@@ -58,9 +58,7 @@ class Stage {
       const { name, frequency } = this.mode;
       return frequency ? `${name} swings at ${SWINGS} Hz in place of ${printed(frequency, 4)} Hz.` : `Shape of ${name}, which does not swing.`;
     }
-    const { slowed, enlarged } = this.shown;
-    const slow = slowed > 1 ? `turning slowed ${printed(slowed)} times` : "turning as it is";
-    return `Drawn with ${slow}, twists ${enlarged > 1 ? `enlarged ${printed(enlarged)} times` : "as they are"}.`;
+    return `Drawn with ${this.shown.words}.`;
   }
 
   /** Draw a time of the motion, or of a chosen mode the instant `clock` in s. */
