@@ -5,6 +5,7 @@ from __future__ import annotations
 import http.client
 import json
 import logging
+import math
 import re
 import signal
 import socket
@@ -256,7 +257,8 @@ def test_a_page_that_is_closed_before_it_is_answered_leaves_no_error(
 
 @pytest.mark.slow
 def test_the_command_serves_its_page_at_the_address_it_prints_until_ctrl_c() -> None:
-    command = [sys.executable, "-m", "shaftwork", "open", "crane-start", "--no-browser", "--set", "J2.J=70"]
+    values = ("--set", "J2.J=70", "--initial", "J1.omega=8.5", "--initial", "J2.omega=90 rpm")
+    command = [sys.executable, "-m", "shaftwork", "open", "crane-start", "--no-browser", *values]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:
         assert program.stdout is not None
         line = program.stdout.readline()
@@ -264,7 +266,10 @@ def test_the_command_serves_its_page_at_the_address_it_prints_until_ctrl_c() -> 
         assert address is not None, line
         client = Client(int(address[1]))
         assert (client.get("/").status, client.get(address[2]).status) == (403, 200)
-        assert b'"value": 70.0' in client.get(address[2]).content
+        page = client.get(address[2]).content
+        assert b'"value": 70.0' in page
+        assert b'"name": "J1.omega", "symbol": ["\\u03c9", ""], "unit": "rad/s", "value": 8.5}' in page
+        assert f'"unit": "rad/s", "value": {str(3 * math.pi)[:12]}'.encode() in page
         assert program.stdout.readline() == "Ctrl-C ends it.\n"
         program.send_signal(signal.SIGINT)
         assert program.wait(timeout=SECONDS) == 0
