@@ -35,11 +35,12 @@ USES = {
 
 NEEDS = {
     "reporting": ("latex", "drawing", "modelfiles"),
-    "live": ("reporting", "latex", "drawing", "modelfiles", "frequency"),
+    "live": ("reporting", "latex", "drawing", "modelfiles", "frequency", "animation"),
 }
 """By feature, those that it is made of."""
 
 JOINS = {
+    "animation": ("shaftwork.live",),
     "drawing": ("shaftwork.reporting", "shaftwork.live"),
     "modelfiles": ("shaftwork.reporting", "shaftwork.live"),
     "reporting": ("shaftwork.live",),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -63,6 +64,10 @@ def address(session: Session) -> Iterator[str]:
     session.closing.clear()
 
 
+SAID = """([name, said]) => {
+  const wrong = document.querySelector(`input[type="text"][data-name="${name}"]`).parentElement.querySelector(".wrong");
+  return wrong.textContent === said && wrong.hidden === (said === "");
+}"""
 SETTLED = "() => document.querySelectorAll('.stale').length === 0 && byId('results').dataset.set"
 
 
@@ -130,18 +135,79 @@ def test_a_value_that_cannot_be_shows_the_sentence_of_the_library_and_the_last_g
     page.goto(address)
     settled(page)
     before = curve(page, "J1.omega")
+    field = page.locator('input[type="text"][data-name="J1.J"]')
     for text, said in {
         "-3": "Inertia 'J1': J = -3 must be at least 0.",
         "heavy": "Inertia 'J1': J = 'heavy' must be a number or a law, not str 'heavy'.",
     }.items():
         enter(page, "J1.J", text)
-        page.wait_for_function("said => byId('message').textContent === said && !byId('message').hidden", arg=said)
-        assert page.locator('input[type="text"][data-name="J1.J"]').get_attribute("aria-invalid") == "true"
+        page.wait_for_function(SAID, arg=["J1.J", said])
+        assert page.locator("#message").is_hidden()
+        assert field.get_attribute("aria-invalid") == "true"
         assert curve(page, "J1.omega") == before
+    page.click("text=Start of the motion")
+    enter(page, "J1.omega", "fast")
+    page.wait_for_function(
+        SAID, arg=["J1.omega", "the start value of 'J1.omega' = 'fast' must be a number, not str 'fast'."]
+    )
     enter(page, "J1.J", "30")
-    page.wait_for_function("() => byId('message').hidden")
+    page.wait_for_function(SAID, arg=["J1.J", ""])
+    enter(page, "J1.omega", "")
+    page.wait_for_function(SAID, arg=["J1.omega", ""])
     assert settled(page) == {"J1.J": 30}
-    assert page.locator('input[type="text"][data-name="J1.J"]').get_attribute("aria-invalid") is None
+    assert field.get_attribute("aria-invalid") == "false"
+
+
+def test_an_end_that_no_page_can_reach_is_named_and_the_page_goes_on(page: Page, address: str) -> None:
+    page.goto(address)
+    settled(page)
+    for text, said in {
+        "soon": "t_end = 'soon' must be a number, not str 'soon'.",
+        "-1": "t_end = -1 must be a finite",
+    }.items():
+        page.fill("#end", text)
+        page.press("#end", "Enter")
+        page.wait_for_function(
+            "said => byId('message').textContent.startsWith(said) && !byId('message').hidden", arg=said
+        )
+        assert page.get_attribute("#end", "aria-invalid") == "true"
+    page.fill("#end", "5")
+    page.press("#end", "Enter")
+    page.wait_for_function("() => byId('message').hidden && shown.t.at(-1) === 5")
+
+
+def test_a_start_value_changes_the_motion_as_in_simulate(page: Page, address: str) -> None:
+    page.goto(address)
+    settled(page)
+    page.click("text=Start of the motion")
+    enter(page, "J1.omega", "2")
+    enter(page, "shaft.phi_rel", "0.01")
+    settled(page)
+    motion = SCENES["crane"]().simulate(10.0, initial={"J1.omega": 2.0, "shaft.phi_rel": 0.01}, t_eval=POINTS)
+    assert curve(page, "shaft.tau") == motion["shaft.tau"].tolist()
+
+
+def test_the_drawing_is_there_before_the_first_answer(page: Page, session: Session) -> None:
+    """The server answers only after the page was looked at."""
+    looked = threading.Event()
+    answer = session.answer
+
+    def later(*arguments: Any) -> Any:
+        looked.wait(60)
+        return answer(*arguments)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(session, "answer", later)
+        with serving(session) as address:
+            page.goto(address)
+            assert page.locator("#drawing svg").is_visible()
+            assert page.locator("#computing").is_visible()
+            assert page.locator("#plot").is_hidden()
+            looked.set()
+            settled(page)
+            assert page.locator("#computing").is_hidden()
+            assert page.locator("#plot").is_visible()
+    session.closing.clear()
 
 
 def test_the_motion_plays_and_a_mode_swings(page: Page, address: str) -> None:
@@ -153,7 +219,7 @@ def test_the_motion_plays_and_a_mode_swings(page: Page, address: str) -> None:
     page.wait_for_function("() => time() > 0.2")
     page.click("#play")
     assert page.evaluate(picture) != first
-    assert "exaggerated" in page.inner_text("#scale")
+    assert "enlarged" in page.inner_text("#scale")
     page.check("#at")  # while the crane travels, both masses swing
     assert settled(page) == {}
     page.check('[aria-label="Swing mode 1"]')

@@ -5,12 +5,15 @@ from __future__ import annotations
 import http.client
 import json
 import logging
+import math
 import re
 import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Iterator
+import threading
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -163,11 +166,45 @@ def test_the_socket_answers_as_the_session_does_and_stays_open_after_an_error(
         line.send("{")
         assert json.loads(line.recv(SECONDS))["error"].startswith("The answer failed with JSONDecodeError: ")
         line.send(json.dumps({"set": {"J2.J": -1}}))
-        assert json.loads(line.recv(SECONDS)) == {"error": "Inertia 'J2': J = -1 must be at least 0."}
+        assert json.loads(line.recv(SECONDS))["error"] == "Inertia 'J2': J = -1 must be at least 0."
         line.send(json.dumps(request))
         again = json.loads(line.recv(SECONDS))
     for key in ("extremes", "modes"):
         assert answer[key] == again[key] == json.loads(json.dumps(session.answer(request)[key]))
+
+
+def test_of_requests_that_wait_the_newest_alone_is_answered(browser: Client) -> None:
+    with browser.socket(browser.home) as line:
+        for number, t_end in enumerate((1e4, 3.0, 4.0, 5.0), start=1):
+            line.send(json.dumps({"number": number, "t_end": t_end}))
+        answers = [json.loads(line.recv(SECONDS))]
+        while answers[-1]["number"] != 4:
+            answers.append(json.loads(line.recv(SECONDS)))
+        line.send(json.dumps({"number": 5, "t_end": 1.0}))
+        assert json.loads(line.recv(SECONDS))["number"] == 5
+    assert len(answers) <= 2  # the first one may have been quick enough
+    assert "error" not in answers[-1]
+
+
+def test_the_work_for_a_page_that_has_left_ends(browser: Client, session: Session) -> None:
+    """Another page is answered long before the motion that nobody waits for would have come to its end."""
+    begun, ended = threading.Event(), threading.Event()
+
+    def endless(_request: object, waits: Callable[[], bool]) -> None:
+        begun.set()
+        while waits():
+            time.sleep(0.01)
+        ended.set()
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(session, "answer", endless)
+        with browser.socket(browser.home) as line:
+            line.send("{}")
+            assert begun.wait(SECONDS)
+        assert ended.wait(SECONDS)
+    with browser.socket(browser.home) as line:
+        line.send("{}")
+        assert "curves" in json.loads(line.recv(SECONDS))
 
 
 def test_the_model_file_has_the_values_of_the_page(browser: Client, tmp_path: Path) -> None:
@@ -220,7 +257,8 @@ def test_a_page_that_is_closed_before_it_is_answered_leaves_no_error(
 
 @pytest.mark.slow
 def test_the_command_serves_its_page_at_the_address_it_prints_until_ctrl_c() -> None:
-    command = [sys.executable, "-m", "shaftwork", "open", "crane-start", "--no-browser", "--set", "J2.J=70"]
+    values = ("--set", "J2.J=70", "--initial", "J1.omega=8.5", "--initial", "J2.omega=90 rpm")
+    command = [sys.executable, "-m", "shaftwork", "open", "crane-start", "--no-browser", *values]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:
         assert program.stdout is not None
         line = program.stdout.readline()
@@ -228,7 +266,10 @@ def test_the_command_serves_its_page_at_the_address_it_prints_until_ctrl_c() -> 
         assert address is not None, line
         client = Client(int(address[1]))
         assert (client.get("/").status, client.get(address[2]).status) == (403, 200)
-        assert b'"value": 70.0' in client.get(address[2]).content
+        page = client.get(address[2]).content
+        assert b'"value": 70.0' in page
+        assert b'"name": "J1.omega", "symbol": ["\\u03c9", ""], "unit": "rad/s", "value": 8.5}' in page
+        assert f'"unit": "rad/s", "value": {str(3 * math.pi)[:12]}'.encode() in page
         assert program.stdout.readline() == "Ctrl-C ends it.\n"
         program.send_signal(signal.SIGINT)
         assert program.wait(timeout=SECONDS) == 0

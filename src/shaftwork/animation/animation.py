@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from shaftwork.animation.turning import turning
+from shaftwork.animation.turning import SPEEDS, train_of
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
+from shaftwork.results.lettering import lettered, replaced
 from shaftwork.results.observer import Array, PhaseRow, Reader
 from shaftwork.results.plotting import curve, new_figure, plain
 
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 
 RATE = 20
 """Pictures per second."""
+SAMPLES = 20
+"""Of a speed, from which its angle is integrated, for each picture."""
 MOST_PICTURES = 2000
 FORMATS = (".gif", ".mp4", ".html")
 SWING = 2.0
@@ -126,32 +129,38 @@ def animate(
 ) -> Animation:
     """A motion as a moving picture; arguments as of `Solution.animate`."""
     count = pictures_of(seconds)
+    train = train_of(reader.observer, SPEEDS[:1])
+    if not train.nodes:
+        raise ParameterError(f"Nothing in '{reader.title}' rotates, so there are no discs to show.")
     times = np.linspace(*span, count)
-    discs = turning(reader, times, seconds)
-    figure = new_figure("Solution.animate()", max(6.0, 1.3 * len(discs.discs)), 4.6)
-    train, below = figure.subplots(2, 1, height_ratios=(3, 2))
-    spokes = draw_discs(train, discs.discs)
-    lines = [train.plot([a + RADIUS, b - RADIUS], [0.0, 0.0], linewidth=4.0, zorder=0)[0] for a, b, _ in discs.joints]
-    torques = np.column_stack([reader.quantity(name)(times) for _, _, name in discs.joints] or [np.zeros((count, 0))])
+    fine = np.linspace(*span, SAMPLES * (count - 1) + 1)
+    shown = train.turning(fine, lambda name: reader.quantity(name)(fine), seconds)
+    angles = shown.angles[::SAMPLES]
+    figure = new_figure("Solution.animate()", max(6.0, 1.3 * len(train.nodes)), 4.6)
+    discs, below = figure.subplots(2, 1, height_ratios=(3, 2))
+    spokes = draw_discs(discs, [node.name for node in train.nodes])
+    ends = [(a + RADIUS, b - RADIUS) for a, b in (part.nodes for part in train.joints)]
+    lines = [discs.plot(places, [0.0, 0.0], linewidth=4.0, zorder=0)[0] for places in ends]
+    torques = np.column_stack([reader.quantity(part.torque)(times) for part in train.joints] or [np.zeros((count, 0))])
     largest = np.abs(torques).max(initial=np.finfo(float).tiny)
     for name in names:
-        below.plot(*curve(reader, name), linewidth=1.0, label=plain(f"{name} in {reader.unit(name)}"))
+        below.plot(*curve(reader, name), linewidth=1.0, label=_written(f"{name} in {reader.unit(name)}"))
     below.set(xlim=span, xlabel="t in s")
     below.legend(loc="upper right", fontsize="small")
     cursor = below.axvline(times[0], color="black", linewidth=0.8)
-    said = f"turning {discs.slowed:.3g} times slower, twists {discs.enlarged:.3g} times larger than they are"
-    title = train.set_title("", fontsize="small")
+    title = discs.set_title("", fontsize="small")
 
     def draw(number: int) -> None:
         t = times[number]
-        turn_spokes(spokes, discs.angles[number])
+        turn_spokes(spokes, angles[number])
         for line, torque in zip(lines, torques[number], strict=True):
             line.set_color(_colour(torque / largest))
         cursor.set_xdata([t, t])
         phase = next((row.name for row in phases if row.start <= t <= row.end), "")
-        title.set_text(plain("\n".join((f"{reader.title}, t = {t:.3f} s", said, phase))))
+        title.set_text(_written("\n".join((f"{reader.title}, t = {t:.3f} s", shown.words, phase))))
 
     draw(0)
+    lettered(figure)
     return Animation(figure, count, draw)
 
 
@@ -169,7 +178,7 @@ def swinging(title: str, shapes: Mapping[str, complex], seconds: float) -> Anima
     if not shapes:
         raise ParameterError(f"{title}: nothing rotates in it, so there are no discs to show.")
     count = pictures_of(seconds)
-    figure = new_figure("Modes.animate()", max(6.0, 1.3 * len(shapes)), 2.8, title)
+    figure = new_figure("Modes.animate()", max(6.0, 1.3 * len(shapes)), 2.8, replaced(title))
     spokes = draw_discs(figure.subplots(), tuple(shapes))
     amplitudes = np.array(list(shapes.values()))
     largest = np.abs(amplitudes).max() or 1.0
@@ -180,6 +189,7 @@ def swinging(title: str, shapes: Mapping[str, complex], seconds: float) -> Anima
         turn_spokes(spokes, LARGEST_SWING * turned.real / largest)
 
     draw(0)
+    lettered(figure)
     return Animation(figure, count, draw)
 
 
@@ -201,7 +211,7 @@ def draw_discs(axes: Axes, names: Sequence[str]) -> list[Any]:
 
     for number, name in enumerate(names):
         axes.add_patch(Circle((number, 0.0), RADIUS, facecolor="0.85", edgecolor="0.3"))
-        axes.text(number, -RADIUS - 0.12, plain(name), ha="center", va="top", fontsize="small", rotation=20)
+        axes.text(number, -RADIUS - 0.12, _written(name), ha="center", va="top", fontsize="small", rotation=20)
     axes.set(xlim=(-0.6, len(names) - 0.4), ylim=(-1.0, 0.6), aspect="equal")
     axes.set_axis_off()
     return [axes.plot([], [], color="0.1", linewidth=2.0)[0] for _ in names]
@@ -212,6 +222,11 @@ def turn_spokes(spokes: Sequence[Any], angles: Array) -> None:
     for number, (spoke, angle) in enumerate(zip(spokes, angles.tolist(), strict=True)):
         x, y = RADIUS * np.sin(angle), RADIUS * np.cos(angle)
         spoke.set_data([number - x, number + x], [-y, y])
+
+
+def _written(text: str) -> str:
+    """A text for a picture, in which names are no formulas and every letter can be drawn."""
+    return plain(replaced(text))
 
 
 def _colour(share: float) -> tuple[float, float, float]:

@@ -50,10 +50,12 @@ def static_page(session: Session, sliders: Sequence[str], counts: Sequence[int] 
             f"sliders = {', '.join(sliders)}: a page without a server has one or two, such as shaft.c."
         )
     grid = _grid(axes, counts or COUNTS[len(axes)])
-    answers = [session.answer({"set": dict(zip(sliders, at, strict=True)), "want": [*WANTED]}) for at in product(*grid)]
+    wanted = [name for name in WANTED if name != "layout"]
+    answers = [session.answer({"set": dict(zip(sliders, at, strict=True)), "want": wanted}) for at in product(*grid)]
     precomputed = {
         "sliders": [{"name": name, "values": values} for name, values in zip(sliders, grid, strict=True)],
         "answers": answers,
+        "layout": session.layout,
     }
     style = f"<style>\n{_text('page.css')}</style>"
     sources = (plotly_script(), *map(_text, SCRIPTS))
@@ -79,6 +81,7 @@ def _filled(session: Session, style: str, scripts: str, answers: Any) -> str:
     return Template(_text("page.html")).substitute(
         title=escape(session.title),
         style=style,
+        drawing=session.drawing({}),
         setup=_data(session.setup),
         answers=_data(answers),
         scripts=scripts,

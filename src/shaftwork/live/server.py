@@ -10,13 +10,14 @@ import socket
 import tempfile
 import threading
 import webbrowser
-from collections.abc import AsyncIterator, Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shaftwork.core.errors import ParameterError, ShaftworkError, imported
 from shaftwork.core.parameters import whole
 from shaftwork.live.admission import HOST, HOSTS, Admission
+from shaftwork.live.desk import Desk
 from shaftwork.live.page import SCRIPTS, WEB, plotly_script, served_page
 from shaftwork.live.page_requests import checked
 from shaftwork.live.session import Session
@@ -51,6 +52,7 @@ def serve(
     say: Callable[[str], None] = print,
     t_end: float | None = None,
     signals: Sequence[str] | None = None,
+    initial: Mapping[str, float] | None = None,
 ) -> None:
     """Open a live page of a network in the browser, and serve it until Ctrl-C.
 
@@ -59,14 +61,15 @@ def serve(
         port: by default a free one.
         browser: whether to open the page.
         say: prints a line.
-        t_end: end of the motion, s, as of `Session`.
-        signals: quantities to draw, as of `Session`.
+        t_end, signals, initial: end of the motion in s, quantities to draw and start values, as of `Session`.
 
     Raises:
         ParameterError: the port is taken, or none.
         MissingExtraError: starlette, uvicorn, websockets or plotly is not installed (extra `live`).
     """
-    session = subject if isinstance(subject, Session) else Session(subject, t_end=t_end, signals=signals)
+    session = subject
+    if not isinstance(session, Session):
+        session = Session(session, t_end=t_end, signals=signals, initial=initial)
     with contextlib.suppress(KeyboardInterrupt), serving(session, port=port) as address:
         say(f"{session.title}: {address}\nCtrl-C ends it.")
         if browser:
@@ -146,18 +149,25 @@ def application(session: Session, token: str, port: int) -> Starlette:
         name = str(request.path_params["name"])
         if name not in FILES or int(request.headers.get("content-length", MOST_BYTES + 1)) > MOST_BYTES:
             return Response("There is no such file.", 404)
+        desk, text = Desk(), await request.body()
+        leaving = asyncio.create_task(desk.listen(request))
         async with one:
-            content = await asyncio.to_thread(_written, session, name, await request.body())
+            content = await asyncio.to_thread(_written, session, name, text, desk.waits)
+        leaving.cancel()
         refused = isinstance(content, str)
         return Response(content, 422 if refused else 200, media_type="text/plain" if refused else FILES[name])
 
     async def answers(line: WebSocket) -> None:
         await line.accept()
+        desk = Desk()
+        listening = asyncio.create_task(desk.listen(line))
         with contextlib.suppress(WebSocketDisconnect):  # the page may be closed before it is answered
-            async for text in _texts(line):
+            while await desk.comes():
                 async with one:
-                    answer = await asyncio.to_thread(_answered, session, text)
-                await line.send_text(answer)
+                    answer = await asyncio.to_thread(_answered, session, desk.take(), desk.waits)
+                if desk.waits():
+                    await line.send_text(answer)
+        await listening
 
     return starlette.Starlette(  # type: ignore[no-any-return]
         routes=[
@@ -173,21 +183,19 @@ def application(session: Session, token: str, port: int) -> Starlette:
     )
 
 
-async def _texts(line: WebSocket) -> AsyncIterator[str]:
-    """What comes over a socket until it is closed; a frame of bytes, which is no request, as an empty text."""
-    while (message := await line.receive())["type"] != "websocket.disconnect":
-        yield message.get("text") or ""
-
-
-def _answered(session: Session, text: str) -> str:
-    """The answer to a request, both as JSON."""
+def _answered(session: Session, text: str, waits: Callable[[], bool]) -> str:
+    """The answer to a request, both as JSON; the number by which a page tells its requests is that of the answer."""
+    number = None
     try:
-        return json.dumps(session.answer(json.loads(text)), allow_nan=False)
+        request = json.loads(text)
+        number = request.pop("number", None) if isinstance(request, dict) else None
+        return json.dumps({"number": number, **session.answer(request, waits)}, allow_nan=False)
     except Exception as error:  # noqa: BLE001 (as on the command line: laws beyond all measure may raise anything)
-        return json.dumps({"error": f"The answer failed with {type(error).__name__}: {' '.join(str(error).split())}."})
+        said = f"The answer failed with {type(error).__name__}: {' '.join(str(error).split())}."
+        return json.dumps({"number": number, "error": said})
 
 
-def _written(session: Session, name: str, text: bytes) -> bytes | str:
+def _written(session: Session, name: str, text: bytes, waits: Callable[[], bool]) -> bytes | str:
     """A file of the values in a request; a text says why there is none."""
     try:
         request = checked(json.loads(text))
@@ -198,7 +206,7 @@ def _written(session: Session, name: str, text: bytes) -> bytes | str:
                 network = subject if isinstance(subject, Network) else subject()
                 write_netlist(network.netlist(), path)
             else:
-                report(subject, t_end=request.get("t_end", session.t_end), signals=session.signals).save(path)
+                report(subject, solution=session.motion(request, waits), signals=session.signals).save(path)
             return path.read_bytes()
     except ShaftworkError as error:
         return str(error)

@@ -6,36 +6,39 @@ import threading
 import time
 import warnings
 from base64 import b64encode
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from shaftwork.core.errors import ShaftworkError, SimulationError
+from shaftwork.animation.turning import Train, train_of
+from shaftwork.codegen.model_observer import ModelObserver
+from shaftwork.core.errors import ShaftworkError, SimulationError, no_quantity
 from shaftwork.core.notices import FILTERS
 from shaftwork.frequency.exact_networks import exact_shafts
 from shaftwork.frequency.natural_modes import Modes
-from shaftwork.live.page_requests import checked
-from shaftwork.live.sliders import Slider, sliders_of
-from shaftwork.live.stage import Stage, stage_of
+from shaftwork.live.page_requests import checked, objections
+from shaftwork.live.sliders import Slider, StartField, sliders_of, start_fields_of
+from shaftwork.live.stage import described, moved
+from shaftwork.live.work import ADVICE, LIMITS, MOST_STEPS, WatchedSolution, Work
 from shaftwork.pipeline.arguments import checked_parameters
 from shaftwork.pipeline.network import Network, network_of, with_values
-from shaftwork.results.observer import Array
-from shaftwork.results.plotting import grouped
+from shaftwork.results.observer import ANGLES, Array
+from shaftwork.results.plotting import MOST_SIGNALS, grouped
 from shaftwork.results.solution import Solution
 from shaftwork.scenes.catalog import Scene
 
 POINTS = 600
 """Output times of a motion: as many as a plot on a screen has room for."""
-MOST_SIGNALS = 8
-"""States drawn when nobody chooses."""
 MOST_MODES = 30
 """Modes in the table, the lowest."""
 END = 10.0
 """End of the motion of a network without a scene, s."""
+SHORTEST, LONGEST = 4.0, 12.0
+"""How long a motion is played, s: as long as it lasts, within these bounds."""
 
 
 class Session:
@@ -45,10 +48,10 @@ class Session:
         subject: a network, or a scene, whose title, end time and signals are taken.
         t_end: end of the motion, s; by default that of the scene, or 10.
         signals: quantities to draw; by default those of the scene, or the first states.
+        initial: start values of speeds, twists and torques, as of `simulate`; the rest is zero.
 
     Raises:
         NetworkError: the network cannot be assembled; lists every reason.
-        SimulationError: it cannot be simulated as it is.
         SignalError: there is no such quantity.
 
     Examples:
@@ -59,22 +62,41 @@ class Session:
     """
 
     def __init__(
-        self, subject: Network | Scene, *, t_end: float | None = None, signals: Sequence[str] | None = None
+        self,
+        subject: Network | Scene,
+        *,
+        t_end: float | None = None,
+        signals: Sequence[str] | None = None,
+        initial: Mapping[str, float] | None = None,
     ) -> None:
         scene = subject if isinstance(subject, Scene) else None
         self.network = scene() if scene else network_of(subject)
         self.scene = scene
         """What it is, where it is one."""
         self.t_end = t_end if t_end is not None else scene.t_end if scene else END
+        self.initial = dict(initial or {})
+        """Start values where a request gives none."""
         self.closing = threading.Event()
         """Set to end what is being computed."""
-        self.model = self.network.compile()
+        self._chosen = tuple(signals if signals is not None else scene.signals if scene else ())
+        self.model = self.network.compile(angles=self._angles((*self.initial, *self._chosen)))
+        self._observer = ModelObserver(self.model.form, lambda: self.model.bind(self.model.defaults))
+        names = dict.fromkeys((*self._observer.units, *self._observer.profiles, *self.model.states))
+        for name in self._chosen:
+            if name not in names:
+                raise no_quantity(str(name), self.model.name, names)
         self._last: tuple[tuple[Any, ...], Solution] | None = None
-        motion, _ = self._motion({}, self.t_end)
-        states = tuple(name for name in motion.states if name in motion)[:MOST_SIGNALS]
-        self.signals = tuple(signals if signals is not None else scene.signals if scene else states)
-        for name in self.signals:
-            motion.reader.unit(name)  # refuses one that is not there
+        self._first: Solution | None = None
+        self._work = Work(self._is_open)
+
+    def _is_open(self) -> bool:
+        return not self.closing.is_set()
+
+    def _angles(self, names: Sequence[str]) -> list[str]:
+        """The parts whose angle, position or flux linkage is among quantities by name."""
+        parts = {part.name for part in self.network.parts}
+        pairs = (name.rpartition(".") for name in names if isinstance(name, str))
+        return list(dict.fromkeys(owner for owner, _, name in pairs if name in ANGLES and owner in parts))
 
     @property
     def title(self) -> str:
@@ -88,50 +110,82 @@ class Session:
         return sliders_of(self.model)
 
     @cached_property
-    def stage(self) -> Stage:
-        """What the page moves."""
-        return stage_of(self.network.graph(), self._motion({}, self.t_end)[0].names)
+    def starts(self) -> Mapping[str, StartField]:
+        """What a motion may start with, by name."""
+        return start_fields_of(self.model, self._observer, self.initial)
 
     @cached_property
-    def setup(self) -> dict[str, Any]:
-        """What a page must know before it asks: title, sliders, axes of the plot, the train that it moves."""
-        motion, _ = self._motion({}, self.t_end)
+    def signals(self) -> tuple[str, ...]:
+        """The quantities that are drawn."""
+        motion = self._first_motion()
+        return self._chosen or tuple(name for name in motion.states if name in motion)[:MOST_SIGNALS]
+
+    @cached_property
+    def _train(self) -> Train:
+        return moved(train_of(self._first_motion().observer))
+
+    @cached_property
+    def layout(self) -> dict[str, Any]:
+        """What stays while values change: the axes of the plot, and the train that the page moves."""
+        motion = self._first_motion()
         units = {name: motion.reader.unit(name) for name in self.signals}
         axes = grouped({name: (motion.t, motion[name]) for name in self.signals}, units)
+        return {
+            "axes": [{"unit": unit, "signals": names} for unit, names in axes],
+            "stage": described(self._train, self.sliders),
+        }
+
+    @property
+    def setup(self) -> dict[str, Any]:
+        """What a page must know before it asks: title, sliders, fields of start values."""
         return {
             "title": self.title,
             "source": self.scene.source if self.scene else "",
             "t_end": self.t_end,
-            "sliders": [slider.described() for slider in self.sliders.values()],
-            "axes": [{"unit": unit, "signals": names} for unit, names in axes],
-            "stage": self.stage.described(),
+            "sliders": [asdict(slider) for slider in self.sliders.values()],
+            "starts": [asdict(field) for field in self.starts.values()],
         }
 
-    def answer(self, request: Mapping[str, Any]) -> dict[str, Any]:
-        """What a page shows for values of parameters, as plain data for JSON.
+    def drawing(self, values: Mapping[str, Any]) -> str:
+        """The network with values of parameters as SVG, for a page of HTML."""
+        svg = with_values(self.network, values).draw(values=True).svg
+        return svg[svg.index("<svg") :]
+
+    def answer(self, request: Mapping[str, Any], waits: Callable[[], bool] = lambda: True) -> dict[str, Any]:
+        """What a page shows for values of parameters, as plain data for JSON; the work has the limits of `Work`.
 
         Args:
-            request: "set", values by "part.parameter" in SI, those of the network elsewhere; "want", some of "curves",
-                "extremes", "modes" and "drawing" (by default the curves, which take the least time); "t_end", s; "at",
-                the time in s of the motion about which modes are, by default rest.
+            request: "set", values by "part.parameter" in SI, those of the network elsewhere; "initial", start values by
+                quantity (by default those of the session); "want", some of "curves", "layout", "extremes", "modes" and
+                "drawing" (by default the curves, which take the least time); "t_end", s; "at", the time in s of the
+                motion about which modes are, by default rest.
+            waits: whether anybody still waits for the answer; asked again and again.
 
         Returns:
-            By what is wanted: "t" and "curves", (k,) doubles as plotly takes them; "phases"; "extremes"; "modes";
-            "drawing", SVG. Always "milliseconds" and "warnings". Or "error", what the library says to values that
-            cannot be.
+            By what is wanted: "t" and "curves", (k,) doubles as plotly takes them, with "train", the angles of its
+            nodes as they are shown, and "phases"; "layout"; "extremes"; "modes"; "drawing", SVG. Always "milliseconds"
+            and "warnings". Or "error", what the library says to values that cannot be, and in "fields" the same by the
+            field of the request and the name.
         """
+        self._work = Work(lambda: self._is_open() and waits())
         with FILTERS, warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             try:
-                answer = self._answer(checked(request))
+                whole = checked(request)
+                if fields := objections(self.model.netlist, self.starts, whole):
+                    texts = dict.fromkeys(text for of in fields.values() for text in of.values())
+                    return {"error": "\n".join(texts), "fields": fields}
+                answer = self._answer(whole)
             except ShaftworkError as error:
                 return {"error": str(error)}
         return answer | {"warnings": list(dict.fromkeys(str(one.message) for one in caught))}
 
     def _answer(self, request: Mapping[str, Any]) -> dict[str, Any]:
         values, wanted = request["set"], request["want"]
-        motion, simulated = self._motion(values, request.get("t_end", self.t_end))
+        motion, simulated = self._motion(request)
         start, answer = time.perf_counter(), dict[str, Any]()
+        if "layout" in wanted:
+            answer["layout"] = self.layout
         if "curves" in wanted:
             answer |= self._curves(motion)
         reading = time.perf_counter() - start
@@ -140,28 +194,54 @@ class Session:
         if "modes" in wanted:
             answer |= self._modes(values, motion, request.get("at"))
         if "drawing" in wanted:
-            svg = with_values(self.network, values).draw(values=True).svg
-            answer["drawing"] = svg[svg.index("<svg") :]
+            answer["drawing"] = self.drawing(values)
         return answer | {"milliseconds": {"simulate": 1e3 * simulated, "read": 1e3 * reading}}
 
-    def _motion(self, values: Mapping[str, Any], t_end: Any) -> tuple[Solution, float]:
+    def motion(self, request: Mapping[str, Any], waits: Callable[[], bool] = lambda: True) -> Solution:
+        """The motion of a request, within the limits of an answer; arguments as of `answer`.
+
+        Raises:
+            ShaftworkError: values cannot be, or the work ended before the motion did.
+        """
+        self._work = Work(lambda: self._is_open() and waits())
+        return self._motion(checked(request))[0]
+
+    def _motion(self, request: Mapping[str, Any]) -> tuple[Solution, float]:
         """The motion, and the seconds that it took; the last one is kept."""
-        key = (t_end, *values.items())
+        values, initial = request.get("set", {}), request.get("initial", self.initial)
+        t_end = request.get("t_end", self.t_end)
+        key = (t_end, *values.items(), None, *initial.items())
         if self._last is not None and self._last[0] == key:
             return self._last[1], 0.0
         start = time.perf_counter()
-        motion = self.model.simulate(t_end, t_eval=POINTS, parameters=values, progress=self._go_on)
-        self._last = key, motion
-        return motion, time.perf_counter() - start
+        try:
+            motion = self.model.simulate(
+                t_end,
+                t_eval=POINTS,
+                parameters=values,
+                initial=initial or None,
+                max_steps=MOST_STEPS,
+                progress=self._go_on,
+            )
+        except SimulationError as error:
+            if f"{MOST_STEPS} steps were not enough" in str(error):  # the next step is another one than in a program
+                raise SimulationError(
+                    f"The motion has not come to its end at t = {t_end:g} s: {LIMITS}. {ADVICE}"
+                ) from None
+            raise
+        watched = WatchedSolution.of(motion, self._go_on)
+        self._last, self._first = (key, watched), self._first or watched
+        return watched, time.perf_counter() - start
 
-    def _go_on(self, reached: float) -> None:
-        if self.closing.is_set():
-            raise SimulationError(f"The session was closed at t = {reached:g} s of the motion.")
+    def _first_motion(self) -> Solution:
+        """By which is chosen what stays: where the network's own values give no motion, others may."""
+        return self._first or self._motion({})[0]
+
+    def _go_on(self, reached: float | None = None) -> None:
+        self._work.go_on(reached)
 
     def _curves(self, motion: Solution) -> dict[str, Any]:
         curves = {name: motion[name] for name in self.signals}
-        for name in self.stage.signals:  # a spring without stiffness has no twist that is read
-            curves.setdefault(name, motion[name] if name in motion else np.zeros_like(motion.t))
         unbounded = [name for name, values in curves.items() if not np.isfinite(values).all()]
         if unbounded:
             raise SimulationError(
@@ -171,8 +251,21 @@ class Session:
         return {
             "t": _doubles(motion.t),
             "curves": {name: _doubles(_worst(values)) for name, values in curves.items()},
+            "train": self._shown(motion),
             "phases": [{"start": row.start, "end": row.end, "modes": dict(row.modes)} for row in motion.phases],
             "engine": motion.engine,
+        }
+
+    def _shown(self, motion: Solution) -> dict[str, Any] | None:
+        """The angles of the train as it is played; None where there is nothing to play."""
+        if not self._train.nodes:
+            return None
+        lasting = min(LONGEST, max(SHORTEST, float(motion.t[-1] - motion.t[0])))
+        turning = self._train.turning(motion.t, motion.__getitem__, lasting)
+        return {
+            "seconds": lasting,
+            "words": turning.words,
+            "angles": [_doubles(angle) for angle in turning.angles.T],
         }
 
     @staticmethod
@@ -193,8 +286,8 @@ class Session:
             modes = self._modes_about(values, None if at is None else motion.at([float(at)]))
         except ShaftworkError as error:
             return {"modes": [], "without modes": str(error)}
-        shapes = np.array([modes.shapes[node["speed"]] for node in self.stage.nodes], dtype=complex)
-        shapes = shapes.reshape(len(self.stage.nodes), len(modes))
+        nodes = self._train.nodes
+        shapes = np.array([modes.shapes[node.speed] for node in nodes], dtype=complex).reshape(len(nodes), len(modes))
         return {
             "modes": [
                 {

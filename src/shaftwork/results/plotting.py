@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 POINTS = 2000
 """Points of a curve besides those where it turns: more than a screen has."""
+MOST_SIGNALS = 8
+"""States drawn when nobody chooses: as many as colours can be told apart."""
 
 Curve = tuple[Array, Array]
 """Times (k,) and values (k,) or, along a part, (k, places)."""

@@ -1,9 +1,9 @@
 "use strict";
 
-/* The page: sliders ask, answers are shown. One question is on its way at a time, and the newest values win. While an
-   answer is drawn, the next one is computed. */
+/* The page: sliders ask, answers are shown. Every change is asked at once; the server answers the newest question. */
 
 const REST = 150; // ms without a change, after which extremes, frequencies and the drawing follow
+const PATIENCE = 300; // ms after which the page says that it waits
 const TICKS = 500; // of a slider, from its middle to each end
 
 const byId = id => document.getElementById(id);
@@ -11,20 +11,29 @@ const setup = JSON.parse(byId("setup").textContent);
 const precomputed = JSON.parse(byId("answers").textContent);
 const values = new Map(setup.sliders.map(slider => [slider.name, slider.value]));
 const controls = new Map();
-const stage = new Stage(byId("stage"), setup.stage);
+const starts = new Map();
+const startFields = new Map();
 
+let layout = null; // axes of the plot and the train, which the first answer brings
+let stage = null;
 let shown = null; // the answer with curves that is shown
 let reference = null; // the one that is kept for comparison
 let extremes = [];
 let modes = [];
-let busy = false;
-let changed = false;
+let asked = 0; // questions so far; the last one's number
+const questions = new Map(); // by number, those that may still be answered
 let resting = 0;
+let waiting = 0;
 let playing = null;
 let updates = [];
 
 function printed(number, digits = 6) {
   return Number.isFinite(number) ? String(Number(number.toPrecision(digits))) : "";
+}
+
+/** A unit as it is written by hand. */
+function spelled(unit) {
+  return unit === "1" ? "" : unit.replaceAll("*", " ").replaceAll("^2", "²").replaceAll("^3", "³");
 }
 
 function numbers(packed) {
@@ -36,95 +45,111 @@ function numbers(packed) {
 
 /* Answers ------------------------------------------------------------------------------------------------------- */
 
-/** Ask the server of this page: one question at a time. */
+/** Ask the server of this page; what it answers goes to `accept`. */
 function askServer() {
-  let socket = null;
-  const connected = () =>
-    new Promise((resolve, reject) => {
-      if (socket && socket.readyState === WebSocket.OPEN) return resolve(socket);
-      socket = new WebSocket(`ws://${location.host}/answers`);
-      socket.onopen = () => resolve(socket);
-      socket.onerror = () => reject(new Error("The command `shaftwork open` has ended. Start it again to go on."));
-    });
-  return async request => {
-    const line = await connected();
-    return new Promise((resolve, reject) => {
-      line.onmessage = event => resolve(JSON.parse(event.data));
-      line.onclose = () => reject(new Error("The command `shaftwork open` has ended. Start it again to go on."));
-      line.send(JSON.stringify(request));
-    });
+  let line = null;
+  return question => {
+    const send = () => question.number === asked && line.send(JSON.stringify(question));
+    if (!line) {
+      line = new WebSocket(`ws://${location.host}/answers`);
+      line.onmessage = event => accept(JSON.parse(event.data));
+      line.onclose = () => {
+        line = null;
+        compute(false);
+        say("The command `shaftwork open` has ended. Start it again to go on.");
+      };
+    }
+    if (line.readyState === WebSocket.OPEN) send();
+    else line.addEventListener("open", send);
   };
 }
 
 /** Look among answers that were computed before: sliders stop at their values only. */
-function askStored() {
-  return async () => {
-    let place = 0;
-    for (const { name, values: offered } of precomputed.sliders) place = place * offered.length + offered.indexOf(values.get(name));
-    return precomputed.answers[place];
-  };
+function askStored(question) {
+  let place = 0;
+  for (const { name, values: offered } of precomputed.sliders) place = place * offered.length + offered.indexOf(values.get(name));
+  const answer = { layout: precomputed.layout, ...precomputed.answers[place], number: question.number };
+  queueMicrotask(() => accept(answer));
 }
 
-const ask = precomputed ? askStored() : askServer();
+const ask = precomputed ? askStored : askServer();
 
-/** A question about the newest values, and its answer once it is there. */
-async function exchange(want) {
-  changed = false;
-  const question = request(want);
-  return { question, answer: await ask(question) };
+/** Put a question about the newest values; those before it are of no interest any more. */
+function put(want) {
+  asked += 1;
+  const question = { number: asked, ...request(want) };
+  questions.set(asked, question);
+  compute(true);
+  ask(question);
+}
+
+/** Say that an answer is waited for, where it takes longer than a moment. */
+function compute(isWaiting) {
+  clearTimeout(waiting);
+  if (isWaiting) waiting = setTimeout(() => (byId("computing").hidden = false), PATIENCE);
+  else byId("computing").hidden = true;
+}
+
+function numberOr(text) {
+  return text !== "" && Number.isFinite(Number(text)) ? Number(text) : text;
 }
 
 function request(want) {
   const set = Object.fromEntries(setup.sliders.filter(one => values.get(one.name) !== one.value).map(one => [one.name, values.get(one.name)]));
-  const end = byId("end").value.trim();
-  const question = { set, want, t_end: end !== "" && Number.isFinite(Number(end)) ? Number(end) : end };
+  const question = { set, initial: Object.fromEntries(starts), want, t_end: numberOr(byId("end").value.trim()) };
   if (byId("at").checked) question.at = time();
   return question;
 }
 
 /** Show the newest values: curves at once, and what takes longer when the values rest. */
-async function follow() {
-  changed = true;
+function follow() {
   clearTimeout(resting);
   for (const part of document.querySelectorAll(".detail")) part.classList.add("stale");
-  if (busy) return;
-  busy = true;
-  try {
-    for (let coming = exchange(["curves"]); coming; ) {
-      const newest = await coming;
-      coming = changed ? exchange(["curves"]) : null;
-      accept(newest, showCurves);
-    }
-  } catch (error) {
-    say(error.message);
-  }
-  busy = false;
-  resting = setTimeout(detail, REST);
+  put(layout ? ["curves"] : ["curves", "layout"]);
 }
 
-async function detail() {
-  if (busy) return;
-  busy = true;
-  try {
-    for (const want of [["extremes", "modes"], ["drawing"]]) {
-      if (!changed) accept(await exchange(want), showDetail);
-    }
-  } catch (error) {
-    say(error.message);
-  }
-  busy = false;
-  if (changed) follow();
-}
-
-function accept({ question, answer }, show) {
-  if (answer.error) {
-    say(answer.error);
-    return;
-  }
-  say("");
-  for (const control of controls.values()) control.field.removeAttribute("aria-invalid");
-  show(answer);
+/** Show an answer, if it is not older than what is shown; ask on once it is that to the newest question. */
+function accept(answer) {
+  const question = questions.get(answer.number);
+  if (!question) return;
+  for (const number of questions.keys()) if (number <= answer.number) questions.delete(number);
+  const isNewest = answer.number === asked;
+  if (isNewest) compute(false);
+  if (isNewest || !answer.error) object(answer);
+  if (answer.error) return;
+  if (answer.layout) arrange(answer.layout);
+  if (answer.curves) showCurves(answer);
+  if (!isNewest) return;
+  showDetail(answer);
   byId("results").dataset.set = JSON.stringify(question.set);
+  if (answer.curves && !precomputed) resting = setTimeout(() => put(["extremes", "modes"]), REST);
+  if (answer.modes && !precomputed) put(["drawing"]);
+}
+
+/** Say what is wrong beside the fields that it is about, all else on top. */
+function object({ error = "", fields: { set: wrong = {}, initial = {}, t_end: end } = {} }) {
+  const rows = [...controls].map(([name, row]) => [row, wrong[name]]).concat([...startFields].map(([name, row]) => [row, initial[name]]));
+  for (const [{ field, wrong: place }, text] of rows) {
+    field.setAttribute("aria-invalid", Boolean(text));
+    place.textContent = text || "";
+    place.hidden = !text;
+  }
+  byId("end").setAttribute("aria-invalid", Boolean(end));
+  const beside = new Set(rows.map(([, text]) => text));
+  say(error.split("\n").filter(line => !beside.has(line)).join("\n"));
+}
+
+function state(text) {
+  byId("state").textContent = text;
+}
+
+/** Take what stays while values change. */
+function arrange(given) {
+  if (layout) return;
+  layout = given;
+  stage = new Stage(byId("stage"), layout.stage);
+  makeLegend();
+  byId("results").classList.remove("waiting");
 }
 
 function say(text) {
@@ -163,56 +188,100 @@ function set(slider, value) {
 }
 
 function typed(slider) {
-  const control = controls.get(slider.name);
-  const text = control.field.value.trim();
-  const number = text === "" ? NaN : Number(text);
-  const value = slider.offered && Number.isFinite(number) ? valueAt(slider, tickOf(slider, number)) : number;
-  if (slider.offered && !Number.isFinite(number)) return set(slider, values.get(slider.name));
-  if (printed(values.get(slider.name)) === text) return undefined;
-  set(slider, Number.isFinite(value) ? value : text);
-  return follow().then(() => byId("message").hidden || control.field.setAttribute("aria-invalid", "true"));
+  const value = numberOr(controls.get(slider.name).field.value.trim());
+  const isNumber = typeof value === "number";
+  if (slider.offered && !isNumber) return set(slider, values.get(slider.name));
+  if (printed(values.get(slider.name)) === String(value)) return undefined;
+  set(slider, slider.offered ? valueAt(slider, tickOf(slider, value)) : value);
+  return follow();
+}
+
+/** A row for one value: its symbol, what it is, its unit and bounds, and a place for what is wrong with it. */
+function makeRow(name, { symbol, unit, bounds = "" }, words, id) {
+  const [row, label, field, of, within, wrong] = ["div", "label", "input", "span", "span", "span"].map(kind => document.createElement(kind));
+  const [letter, subscript] = ["span", "sub"].map(kind => document.createElement(kind));
+  row.className = "value";
+  letter.className = "symbol";
+  [letter.textContent, subscript.textContent] = symbol;
+  letter.append(subscript);
+  label.append(letter, ` ${words}`);
+  label.title = name;
+  label.htmlFor = id;
+  Object.assign(field, { type: "text", inputMode: "decimal" });
+  field.dataset.name = name;
+  field.setAttribute("aria-label", `${name} in ${unit}`);
+  Object.assign(of, { className: "unit", textContent: spelled(unit) });
+  Object.assign(within, { className: "bounds", textContent: bounds, hidden: !bounds });
+  Object.assign(wrong, { className: "wrong", hidden: true, id: `wrong-${id}` });
+  wrong.setAttribute("role", "alert");
+  field.setAttribute("aria-describedby", wrong.id);
+  row.append(label, field, of, within, wrong);
+  return { row, label, field, wrong };
 }
 
 function makeSlider(slider, place) {
   const stored = precomputed && precomputed.sliders.find(one => one.name === slider.name);
   if (precomputed && !stored) return null;
   if (stored) slider.offered = stored.values;
-  const [row, label, range, field] = ["div", "label", "input", "input"].map(name => document.createElement(name));
-  const key = slider.name.slice(slider.name.lastIndexOf(".") + 1);
-  row.className = "value";
-  label.textContent = `${key}: ${slider.meaning}${slider.unit === "1" ? "" : ` in ${slider.unit}`}`;
-  label.htmlFor = range.id = `slider-${place}`;
-  Object.assign(range, { type: "range", step: 1, min: stored ? 0 : -TICKS, max: stored ? stored.values.length - 1 : TICKS });
-  range.dataset.name = field.dataset.name = slider.name;
-  Object.assign(field, { type: "text", inputMode: "decimal" });
-  field.setAttribute("aria-label", `${slider.name} in ${slider.unit}`);
+  const { row, label, field, wrong } = makeRow(slider.name, slider, slider.meaning, `slider-${place}`);
+  const range = document.createElement("input");
+  Object.assign(range, { id: label.htmlFor, type: "range", step: 1 });
+  Object.assign(range, { min: stored ? 0 : -TICKS, max: stored ? stored.values.length - 1 : TICKS });
+  range.dataset.name = slider.name;
   range.addEventListener("input", () => {
     set(slider, valueAt(slider, Number(range.value)));
     follow();
   });
   field.addEventListener("change", () => typed(slider));
-  label.title = "Double-click: back to the value of the network";
+  label.title = `${slider.name}; double-click: back to the value of the network`;
   label.addEventListener("dblclick", () => {
     set(slider, slider.value);
     follow();
   });
-  row.append(label, range, field);
-  controls.set(slider.name, { row, range, field });
+  label.after(range);
+  controls.set(slider.name, { row, range, field, wrong });
   set(slider, slider.value);
   return row;
 }
 
-function makeSliders() {
+/** A field for a start value; an empty one is left to the library, which begins at rest. */
+function makeStart(start, place) {
+  const words = `of ${start.name.slice(0, start.name.lastIndexOf("."))}`;
+  const { row, field, wrong, label } = makeRow(start.name, start, words, `start-${place}`);
+  Object.assign(field, { id: label.htmlFor, placeholder: "rest" });
+  row.classList.add("start");
+  field.addEventListener("change", () => {
+    setStart(start, numberOr(field.value.trim()));
+    follow();
+  });
+  startFields.set(start.name, { field, wrong });
+  setStart(start, start.value);
+  return row;
+}
+
+function setStart(start, value) {
+  const isNone = value === null || value === "";
+  if (isNone) starts.delete(start.name);
+  else starts.set(start.name, value);
+  startFields.get(start.name).field.value = isNone ? "" : typeof value === "number" ? printed(value) : value;
+}
+
+function makeGroup(title, rows, open) {
+  if (!rows.length) return;
+  const [group, heading] = ["details", "summary"].map(name => document.createElement(name));
+  group.open = open;
+  heading.textContent = title;
+  group.append(heading, ...rows);
+  byId("values").append(group);
+}
+
+function makeFields() {
   const parts = Map.groupBy(setup.sliders, slider => slider.name.slice(0, slider.name.lastIndexOf(".")));
+  const open = setup.sliders.length <= 24 || Boolean(precomputed);
   for (const [part, sliders] of parts) {
-    const rows = sliders.map(slider => makeSlider(slider, setup.sliders.indexOf(slider))).filter(Boolean);
-    if (!rows.length) continue;
-    const [group, heading] = ["details", "summary"].map(name => document.createElement(name));
-    group.open = setup.sliders.length <= 24 || Boolean(precomputed);
-    heading.textContent = part;
-    group.append(heading, ...rows);
-    byId("values").append(group);
+    makeGroup(part, sliders.map(slider => makeSlider(slider, setup.sliders.indexOf(slider))).filter(Boolean), open);
   }
+  if (!precomputed) makeGroup("Start of the motion", setup.starts.map(makeStart), starts.size > 0);
 }
 
 /* What is shown ------------------------------------------------------------------------------------------------- */
@@ -225,7 +294,7 @@ function showCurves(answer) {
   extremes = [];
   drawPlot();
   showPhases();
-  stage.update(t, curves, answer.phases, name => values.get(name), playRate());
+  stage.update(t, answer.train, answer.phases, name => values.get(name));
   byId("scale").textContent = stage.scale;
   showTime();
   updates = [...updates.filter(then => then > start - 1000), start];
@@ -233,7 +302,7 @@ function showCurves(answer) {
   const rate = updates.length > 1 ? `, ${updates.length} updates in the last second` : "";
   const computed = precomputed ? "Computed before" : `Simulated in ${simulate.toFixed(1)} ms, read in ${reading.toFixed(1)} ms`;
   const warned = answer.warnings.length ? ` ${answer.warnings.join(" ")}` : "";
-  byId("state").textContent = `${computed}, drawn in ${(performance.now() - start).toFixed(0)} ms${rate}.${warned}`;
+  state(`${computed}, drawn in ${(performance.now() - start).toFixed(0)} ms${rate}.${warned}`);
 }
 
 function showPhases() {
@@ -244,11 +313,11 @@ function showPhases() {
 
 function showExtremes() {
   const place = placeOf(shown.t, time());
-  const rows = setup.axes.flatMap(axis =>
+  const rows = layout.axes.flatMap(axis =>
     axis.signals.map(name => {
       const row = extremes.find(one => one.name === name);
       const ends = row ? [row.min, row.t_min, row.max, row.t_max] : sampled(shown.curves[name]);
-      return [name, axis.unit, read(shown.curves[name], place), ...ends];
+      return [name, spelled(axis.unit), read(shown.curves[name], place), ...ends];
     }),
   );
   fill("extremes", rows);
@@ -296,10 +365,9 @@ function showDetail(answer) {
 
 /* Motion -------------------------------------------------------------------------------------------------------- */
 
-/** Seconds of the motion that one second plays: at least 4 and at most 12 seconds are played. */
+/** Seconds of the motion that one second plays. */
 function playRate() {
-  const length = shown.t.at(-1) - shown.t[0];
-  return length / Math.min(12, Math.max(4, length));
+  return (shown.t.at(-1) - shown.t[0]) / (shown.train ? shown.train.seconds : 10);
 }
 
 function time() {
@@ -352,28 +420,29 @@ function play() {
 /* Tools --------------------------------------------------------------------------------------------------------- */
 
 async function download(name) {
-  const { set: changes, t_end: end } = request([]);
-  byId("state").textContent = `${name} is being written.`;
-  const response = await fetch(`/files/${name}`, { method: "POST", body: JSON.stringify({ set: changes, t_end: end }) });
+  const { want, ...changes } = request([]);
+  state(`${name} is being written.`);
+  const response = await fetch(`/files/${name}`, { method: "POST", body: JSON.stringify(changes) });
+  state("");
   if (!response.ok) return say(await response.text());
   const link = document.createElement("a");
   link.href = URL.createObjectURL(await response.blob());
   link.download = name;
   link.click();
   URL.revokeObjectURL(link.href);
-  byId("state").textContent = `${name} is saved.`;
+  state(`${name} is saved.`);
   return undefined;
 }
 
 function start() {
   byId("source").textContent = setup.source;
   byId("end").value = printed(setup.t_end);
-  makeSliders();
-  makeLegend();
+  makeFields();
   byId("end").addEventListener("change", follow);
   byId("tools").addEventListener("submit", event => event.preventDefault());
   byId("reset").addEventListener("click", () => {
     for (const slider of setup.sliders) if (controls.has(slider.name)) set(slider, slider.value);
+    for (const start of setup.starts) if (startFields.has(start.name)) setStart(start, start.value);
     byId("end").value = printed(setup.t_end);
     follow();
   });

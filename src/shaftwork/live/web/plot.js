@@ -8,7 +8,7 @@ const hidden = new Set(); // names of curves that are not drawn
 const COLOURS = ["#1c4f8f", "#c4540a", "#2a7d3f", "#a3262a", "#6d4aa8", "#7a5230", "#b8478f", "#555b63"];
 
 function traces(answer, named) {
-  return setup.axes.flatMap((axis, place) =>
+  return layout.axes.flatMap((axis, place) =>
     axis.signals.map(name => ({
       x: answer.t,
       y: answer.curves[name],
@@ -23,7 +23,7 @@ function traces(answer, named) {
 
 /** A switch for each curve: plotly's legend measures its texts anew at every update, and no key reaches it. */
 function makeLegend() {
-  for (const name of setup.axes.flatMap(axis => axis.signals)) {
+  for (const name of layout.axes.flatMap(axis => axis.signals)) {
     const [label, box] = ["label", "input"].map(kind => document.createElement(kind));
     Object.assign(box, { type: "checkbox", checked: true });
     box.style.accentColor = colourOf(name);
@@ -38,7 +38,7 @@ function makeLegend() {
 }
 
 function colourOf(name) {
-  return COLOURS[setup.axes.flatMap(axis => axis.signals).indexOf(name) % COLOURS.length];
+  return COLOURS[layout.axes.flatMap(axis => axis.signals).indexOf(name) % COLOURS.length];
 }
 
 function marks() {
@@ -59,7 +59,7 @@ function marks() {
 }
 
 function axisOf(name) {
-  const place = setup.axes.findIndex(axis => axis.signals.includes(name));
+  const place = layout.axes.findIndex(axis => axis.signals.includes(name));
   return place ? `y${place + 1}` : "y";
 }
 
@@ -72,8 +72,8 @@ function phaseLines() {
 }
 
 function drawPlot() {
-  const count = setup.axes.length;
-  const layout = {
+  const count = layout.axes.length;
+  const sheet = {
     height: 90 + 190 * count,
     margin: { l: 64, r: 12, t: 8, b: 40 },
     uirevision: "same",
@@ -81,12 +81,12 @@ function drawPlot() {
     xaxis: { ...AXIS, title: { text: "t in s" }, anchor: count > 1 ? `y${count}` : "y", range: [shown.t[0], shown.t.at(-1)] },
     shapes: phaseLines(),
   };
-  setup.axes.forEach((axis, place) => {
+  layout.axes.forEach((axis, place) => {
     const domain = [1 - (place + 1) / count + (place < count - 1 ? 0.04 : 0), 1 - place / count];
-    layout[place ? `yaxis${place + 1}` : "yaxis"] = { ...AXIS, title: { text: axis.unit }, domain };
+    sheet[place ? `yaxis${place + 1}` : "yaxis"] = { ...AXIS, title: { text: spelled(axis.unit) }, domain };
   });
   const before = reference ? traces(reference, false) : [];
-  Plotly.react("plot", [...before, ...traces(shown, true), ...marks()], layout, { responsive: true, displaylogo: false });
+  Plotly.react("plot", [...before, ...traces(shown, true), ...marks()], sheet, { responsive: true, displaylogo: false });
 }
 
 function fill(table, rows) {

@@ -1,19 +1,15 @@
 "use strict";
 
-/* The train as it moves: discs turn, slowed; shafts twist, exaggerated; gaps, brakes and clutches say their mode. */
+/* The train as it moves: discs turn, slowed; shafts twist, enlarged; gaps, brakes and clutches say their mode. */
 
 const SWING = 0.6; // amplitude of a mode, rad
 const SWINGS = 0.5; // of a mode per second
-const TWIST = 0.8; // the largest twist as drawn, rad
-const TURN = 5; // the largest speed as drawn, rad/s
-const HEIGHT = 150; // of a row of discs, pixels
+const HEIGHT = 184; // of a row of discs, pixels
+const MIDDLE = 84; // of a disc, from the upper edge of its row, pixels
+const LARGEST = 42; // radius of a disc, pixels
+const NARROWEST = 84; // column, pixels: a train that needs more than the screen has is scrolled
+const LINE = 13; // height of a line of text, pixels
 const HOLDS = /stuck|locked|engaged|contact|closed|conducting/;
-
-/** The largest of 1, 2 and 5 times a power of ten up to a number. */
-function rounded(number) {
-  const power = 10 ** Math.floor(Math.log10(number));
-  return [5, 2, 1].find(factor => factor * power <= number * (1 + 1e-9)) * power;
-}
 
 /** The place of a time among ascending times, with its fraction. */
 function placeOf(t, time) {
@@ -32,120 +28,72 @@ function read(values, place) {
   return values[place.low] + place.share * (values[place.high] - values[place.low]);
 }
 
-/** Integral of values over times, by trapezoids. */
-function integral(t, values) {
-  const sums = new Float64Array(t.length);
-  for (let k = 1; k < t.length; k++) sums[k] = sums[k - 1] + ((t[k] - t[k - 1]) * (values[k] + values[k - 1])) / 2;
-  return sums;
-}
-
-function largest(arrays) {
-  let size = 0;
-  for (const values of arrays) for (const value of values) size = Math.max(size, Math.abs(value));
-  return size;
-}
-
 class Stage {
   constructor(canvas, train) {
     this.canvas = canvas;
     this.train = train;
     this.rows = 1 + Math.max(0, ...train.nodes.map(node => node.row));
     this.columns = 1 + Math.max(0, ...train.nodes.map(node => node.column));
-    this.next = train.nodes.map((_, k) => train.links.filter(link => link.a === k || link.b === k));
     this.mode = null;
   }
 
-  /** Take a motion: curves by name, its phases, values of parameters, and how many of its seconds one second plays. */
-  update(t, curves, phases, value, rate) {
-    const { nodes, links } = this.train;
+  /** Take a motion: its times, the angles of the train at these, its phases, and values of parameters. */
+  update(t, train, phases, value) {
+    const { nodes } = this.train;
     this.t = t;
     this.phases = phases;
-    this.angles = nodes.map(node => integral(t, curves[node.speed]));
-    this.twists = new Map();
-    for (const link of links) {
-      if (link.twist) this.twists.set(link, curves[link.twist]);
-      else if (link.role === "store") this.twists.set(link, this.angles[link.a].map((angle, k) => angle - this.angles[link.b][k]));
-    }
-    this.ratios = new Map(links.filter(link => link.ratio).map(link => [link, value(link.ratio)]));
+    this.shown = train;
+    if (!train) return;
+    this.angles = train.angles.map(numbers);
     const inertias = nodes.map(node => node.inertias.reduce((sum, name) => sum + (value(name) || 0), 0));
     const most = turns => Math.max(...inertias.filter((_, k) => nodes[k].turns === turns));
     const share = (inertia, k) => (inertia / most(nodes[k].turns)) ** 0.2;
     this.sizes = inertias.map((inertia, k) => (inertia > 0 ? Math.max(0.35, share(inertia, k)) : 0.25));
-    const fastest = largest(nodes.map(node => curves[node.speed])) * rate;
-    this.slowed = fastest > TURN ? rounded(TURN / fastest) : 1;
-    const twist = largest(this.twists.values());
-    this.exaggerated = twist > 0 && twist < TWIST ? rounded(TWIST / twist) : 1;
   }
 
   /** In words, how it is drawn. */
   get scale() {
-    if (!this.train.nodes.length) return "This network has too many nodes to be drawn in motion.";
-    if (this.mode) return `${this.mode.name} swings at ${SWINGS} Hz in place of ${this.mode.frequency.toPrecision(4)} Hz.`;
-    const slow = this.slowed < 1 ? `turning slowed 1:${Math.round(1 / this.slowed)}` : "turning as it is";
-    return `Drawn with ${slow}, twist ${this.exaggerated > 1 ? `exaggerated ${this.exaggerated} times` : "as it is"}.`;
-  }
-
-  /** Angles of all nodes at a time of the motion, as drawn. */
-  drawnAngles(time) {
-    const place = placeOf(this.t, time);
-    const angles = new Array(this.train.nodes.length);
-    for (let first = 0; first < angles.length; first++) {
-      if (angles[first] !== undefined) continue;
-      angles[first] = this.slowed * read(this.angles[first], place);
-      for (const queue = [first]; queue.length; ) {
-        const node = queue.shift();
-        for (const link of this.next[node]) {
-          const other = link.a === node ? link.b : link.a;
-          if (angles[other] !== undefined) continue;
-          angles[other] = this.across(link, node === link.a, angles[node], other, place);
-          queue.push(other);
-        }
-      }
+    if (!this.shown) return "Nothing turns or slides, or too many nodes for a drawing in motion.";
+    if (this.mode) {
+      const { name, frequency } = this.mode;
+      return frequency ? `${name} swings at ${SWINGS} Hz in place of ${printed(frequency, 4)} Hz.` : `Shape of ${name}, which does not swing.`;
     }
-    return angles;
-  }
-
-  across(link, forward, angle, other, place) {
-    if (this.twists.has(link)) {
-      const twist = this.exaggerated * read(this.twists.get(link), place);
-      return forward ? angle - twist : angle + twist;
-    }
-    const ratio = this.ratios.get(link);
-    if (ratio) return forward ? angle / ratio : angle * ratio;
-    return this.slowed * read(this.angles[other], place);
+    return `Drawn with ${this.shown.words}.`;
   }
 
   /** Draw a time of the motion, or of a chosen mode the instant `clock` in s. */
   draw(time, clock) {
-    const width = this.canvas.clientWidth;
+    const width = Math.max(this.canvas.parentElement.clientWidth, NARROWEST * this.columns);
     const height = HEIGHT * this.rows;
     const density = window.devicePixelRatio || 1;
     if (this.canvas.width !== Math.round(width * density) || this.canvas.height !== Math.round(height * density)) {
       this.canvas.width = Math.round(width * density);
       this.canvas.height = Math.round(height * density);
-      this.canvas.style.height = `${height}px`;
+      Object.assign(this.canvas.style, { width: `${width}px`, height: `${height}px` });
     }
     const pen = this.canvas.getContext("2d");
     pen.setTransform(density, 0, 0, density, 0, 0);
     pen.clearRect(0, 0, width, height);
-    if (!this.t || !this.train.nodes.length) return;
+    if (!this.shown) return;
     const phase = 2 * Math.PI * SWINGS * clock;
+    const place = placeOf(this.t, time);
     const angles = this.mode
       ? this.mode.shape.map(([real, imaginary]) => SWING * (real * Math.cos(phase) - imaginary * Math.sin(phase)))
-      : this.drawnAngles(time);
+      : this.angles.map(angle => read(angle, place));
     const room = width / this.columns;
-    const places = this.train.nodes.map(node => ({ x: (node.column + 0.5) * room, y: (node.row + 0.42) * HEIGHT }));
-    const radius = Math.min(42, 0.4 * room);
+    const places = this.train.nodes.map(node => ({ x: (node.column + 0.5) * room, y: node.row * HEIGHT + MIDDLE }));
+    const radius = Math.min(LARGEST, 0.4 * room);
     const modes = this.mode ? {} : (this.phases.findLast(row => row.start <= time) || this.phases[0] || { modes: {} }).modes;
-    for (const link of this.train.links) this.drawLink(pen, link, places, angles, modes, room);
-    this.train.nodes.forEach((node, k) => this.drawNode(pen, node, places[k], radius * this.sizes[k], angles[k], room));
-    this.train.nodes.forEach((_, k) => this.drawEnds(pen, k, places[k], radius * this.sizes[k], modes, room));
+    for (const link of this.train.links) this.drawLink(pen, link, places, angles, modes);
+    this.train.nodes.forEach((node, k) => this.drawNode(pen, node, places[k], radius * this.sizes[k], angles[k]));
+    for (const link of this.train.links) this.nameLink(pen, link, places, modes);
+    this.train.nodes.forEach((_, k) => this.nameNode(pen, k, places[k], radius * this.sizes[k], modes, room));
   }
 
-  drawLink(pen, link, places, angles, modes, room) {
+  drawLink(pen, link, places, angles, modes) {
     const [a, b] = [places[link.a], places[link.b]];
     const mode = modes[link.part];
-    const half = link.ratio ? 9 : 6;
+    const half = 6;
     const open = mode !== undefined && !HOLDS.test(mode);
     pen.lineWidth = 1;
     pen.strokeStyle = open ? "#b35c00" : "#59616d";
@@ -153,13 +101,19 @@ class Stage {
     const at = share => ({ x: a.x + share * (b.x - a.x), y: a.y + share * (b.y - a.y) });
     const [one, other] = [angles[link.a], angles[link.b]];
     const middle = (one + other) / 2;
-    this.drawShaft(pen, a, at(near), half, one, open ? one : middle);
-    this.drawShaft(pen, at(far), b, half, open ? other : middle, other);
-    pen.fillStyle = open ? "#b35c00" : "#59616d";
-    pen.font = "11px system-ui, sans-serif";
-    pen.textAlign = "center";
-    const words = mode === undefined ? link.part : `${link.part}: ${mode}`;
-    if (mode !== undefined || room > 80) pen.fillText(words, (a.x + b.x) / 2, (a.y + b.y) / 2 - half - 5);
+    const isApart = open || !link.twists; // each half turns with its end
+    this.drawShaft(pen, a, at(near), half, one, isApart ? one : middle);
+    this.drawShaft(pen, at(far), b, half, isApart ? other : middle, other);
+  }
+
+  /** The name of a part between two nodes, above all discs of its row; of one between rows, in its middle. */
+  nameLink(pen, link, places, modes) {
+    const [a, b] = [places[link.a], places[link.b]];
+    const mode = modes[link.part];
+    const colour = mode !== undefined && !HOLDS.test(mode) ? "#b35c00" : "#59616d";
+    const lines = wrapped(pen, mode === undefined ? link.part : `${link.part}: ${mode}`, Math.max(NARROWEST, Math.abs(b.x - a.x)) - 8);
+    const y = a.y === b.y ? a.y - LARGEST - LINE * lines.length + 6 : (a.y + b.y) / 2;
+    write(pen, lines, (a.x + b.x) / 2, y, colour);
   }
 
   /** A piece of a shaft with lines along its surface, which show how it turns and twists. */
@@ -191,7 +145,7 @@ class Stage {
     pen.stroke();
   }
 
-  drawNode(pen, node, at, radius, angle, room) {
+  drawNode(pen, node, at, radius, angle) {
     pen.lineWidth = 1.5;
     pen.strokeStyle = "#1c1c1c";
     pen.fillStyle = "#eef2f8";
@@ -213,24 +167,39 @@ class Stage {
     pen.strokeStyle = "#1c4f8f";
     pen.lineWidth = 3;
     pen.stroke();
-    if (room > 45) {
-      pen.fillStyle = "#1c1c1c";
-      pen.font = "11px system-ui, sans-serif";
-      pen.textAlign = "center";
-      pen.fillText(node.name, at.x, at.y + Math.max(radius, 12) + 14);
-    }
   }
 
-  drawEnds(pen, k, at, radius, modes, room) {
-    pen.font = "11px system-ui, sans-serif";
-    pen.textAlign = "center";
-    let y = at.y + Math.max(radius, 12) + 28;
-    for (const end of this.train.ends.filter(one => one.node === k)) {
-      const mode = modes[end.part];
-      if (mode === undefined) continue;
-      pen.fillStyle = HOLDS.test(mode) ? "#1a6b2f" : "#b35c00";
-      pen.fillText(room > 45 ? `${end.part}: ${mode}` : mode, at.x, y);
-      y += 13;
+  /** The name of a node below it, and the modes of the parts that are there alone. */
+  nameNode(pen, k, at, radius, modes, room) {
+    const name = wrapped(pen, this.train.nodes[k].name, room - 4);
+    let y = at.y + Math.max(radius, 12) + 14;
+    write(pen, name, at.x, y, "#1c1c1c");
+    y += LINE * name.length;
+    for (const end of this.train.ends.filter(one => one.node === k && modes[one.part] !== undefined)) {
+      const lines = wrapped(pen, `${end.part}: ${modes[end.part]}`, room - 4);
+      write(pen, lines, at.x, y, HOLDS.test(modes[end.part]) ? "#1a6b2f" : "#b35c00");
+      y += LINE * lines.length;
     }
   }
+}
+
+/** Words in lines as wide as there is room. */
+function wrapped(pen, text, width) {
+  pen.font = "11px system-ui, sans-serif";
+  const lines = [];
+  for (const word of text.split(" ")) {
+    const longer = lines.length ? `${lines.at(-1)} ${word}` : word;
+    if (lines.length && pen.measureText(longer).width <= width) lines[lines.length - 1] = longer;
+    else lines.push(word);
+  }
+  return lines;
+}
+
+/** Lines of text about a place, with a white edge that parts them from what is below. */
+function write(pen, lines, x, y, colour) {
+  Object.assign(pen, { textAlign: "center", lineWidth: 3, strokeStyle: "#fff", fillStyle: colour });
+  lines.forEach((line, k) => {
+    pen.strokeText(line, x, y + LINE * k);
+    pen.fillText(line, x, y + LINE * k);
+  });
 }
