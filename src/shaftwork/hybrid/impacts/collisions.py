@@ -32,7 +32,7 @@ from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import SimulationError
 from shaftwork.hybrid.hybrid_state import HybridState, Regime
 from shaftwork.hybrid.hybrid_transfer import HybridTransfer
-from shaftwork.hybrid.impacts.contacts import Contact, in_turn, lasting, nodes, opens_at, touching
+from shaftwork.hybrid.impacts.impact_contacts import Contact, in_turn, lasting, nodes, opens_at, touching
 from shaftwork.hybrid.impacts.impulses import NOTHING_OF, ImpactStage, ImpactStart, ImpulseOutcome, Impulses, summed
 from shaftwork.hybrid.modes.mode_equations import KEPT
 from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, GivesWay, ModeNames, limited, with_modes
