@@ -44,6 +44,7 @@ from PIL import Image
 from shaftwork.cli import main as command_line
 from shaftwork.components import FAMILIES, REGISTRY, Component, Port
 from shaftwork.core.parameters import Parameter
+from shaftwork.integrate.engines import ENGINES
 from shaftwork.scenes import SCENES
 from shaftwork.studies.stability import Stability, stability
 
@@ -247,6 +248,16 @@ def _port(port: Port) -> str:
     return f"{port.name} ({domain}, optional)" if port.optional else f"{port.name} ({domain})"
 
 
+def engine_table() -> str:
+    """The engines that a run may be asked for."""
+    rows = (
+        f"| `{name}` | {entry.method} | {f'extra `{entry.extra}`' if entry.extra else ''} | {entry.suited} |\n"
+        for name, entry in ENGINES.items()
+        if not entry.part_of
+    )
+    return "| name | method | needs | for |\n|---|---|---|---|\n" + "".join(rows)
+
+
 def scene_table() -> str:
     """The scenes with their sources and what was chosen."""
     rows = (
@@ -295,6 +306,7 @@ def stability_engines() -> str:
 MADE: dict[str, Callable[[], str]] = {
     "component list": component_list,
     "component pages": component_pages,
+    "engine table": engine_table,
     "scene table": scene_table,
     "stability models": stability_models,
     "stability engines": stability_engines,

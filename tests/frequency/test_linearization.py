@@ -283,5 +283,5 @@ def test_values_that_change_no_structure_need_no_other_equations_beside_a_lossy_
     net.add(sw.Spring("s", c=10.0), "b", "c")
     net.add(sw.Inertia("J2", J=1.0), "c")
     for model in (net.compile(), net.compile().phase("g driving forward")):
-        p = dict(zip(model.parameters, model.defaults.tolist(), strict=True)) | {"s.c": 20.0}
+        p = {**model.parameters, "s.c": 20.0}
         assert not model.arrays.assembly.degenerates(model.vector(p))

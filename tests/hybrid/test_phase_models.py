@@ -235,6 +235,46 @@ def test_sensitivities_at_a_moment_are_those_of_the_modes_there_where_a_speed_is
     assert made.relative["shaft.c"][0] == pytest.approx(0.5, abs=1e-3)  # the damping moves it by its square, 3e-4
 
 
+def test_a_network_is_assembled_for_its_first_phase_and_has_no_number_of_a_mode_among_its_parameters() -> None:
+    model = crane().compile()
+    sets = model.equation_sets  # type: ignore[attr-defined]
+    first = sets.of(sets.first).model
+    assert first.form is model.form
+    assert {*first.parameters} - {*model.parameters} == {"gap.mode", "load.mode", "brake.mode"}
+    assert [sets.first, *(value for name, value in first.parameters.items() if name.endswith("mode"))] == [
+        ("open", "forward", "forward"),
+        *(0.0, 1.0, 1.0),
+    ]
+
+
+def behind_a_gap(beside: sw.Component) -> sw.Network:
+    """A node without inertia between a gap that gives way and something else."""
+    net = sw.Network("behind a gap")
+    net.add(sw.TorqueSource("motor", tau=1.0), "a")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.Backlash("gap", gap=0.1, c=1e4, d=10.0), "a", "b")
+    net.add(beside, "b", "c")
+    net.add(sw.Inertia("J2", J=1.0), "c")
+    return net
+
+
+@pytest.mark.parametrize(
+    ("beside", "kind"),
+    [
+        (sw.Spring("shaft", c=1e3, d=1.0), "algebraic loop"),  # in contact; while the gap is open the damping holds
+        (sw.Backlash("other", gap=0.1, c=1e4, d=10.0), "undetermined speed"),  # while both are open
+    ],
+    ids=["spring", "gap"],
+)
+def test_what_lacks_in_a_later_phase_is_said_when_the_network_is_checked_and_compiled(
+    beside: sw.Component, kind: str
+) -> None:
+    net = behind_a_gap(beside)
+    assert [problem.kind for problem in net.check()] == [kind]
+    with pytest.raises(sw.NetworkError, match=f"{kind}: node 'b'"):
+        net.compile()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", registered())
 def test_modes_that_say_the_same_have_the_same_equations(name: str) -> None:

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 import shaftwork as sw
 from shaftwork.core.errors import ParameterError, SimulationError
-from shaftwork.integrate import choice, scipy_ivp
+from shaftwork.integrate import choice, scipy_ivp, stepping
 from shaftwork.integrate.collocation import banded
 from shaftwork.integrate.collocation.banded_stages import ShiftedMatrix, shifted_collocation
 from shaftwork.integrate.linear import propagation
@@ -403,7 +403,7 @@ def test_a_motion_that_cannot_go_on_is_named(rhs, reason):
 
 @pytest.mark.slow
 def test_a_motion_that_two_laws_drive_back_to_their_jump_is_named(monkeypatch):
-    monkeypatch.setattr("shaftwork.integrate.stepping.STALL_STEPS", 100)
+    monkeypatch.setitem(stepping.Pace.__init__.__kwdefaults__, "every", 100)
     jacobian, start = sparse.csc_array((1, 1)), np.ones(1)
     problem = one_speed(lambda _t, x: -np.sign(x) - 0.5, lambda _t, _x: jacobian, x0=start, max_steps=20_000)
     with pytest.raises(SimulationError, match=r"banded engine failed at t = 0\.66666.*both sides of a jump"):

@@ -11,7 +11,7 @@ import pytest
 from scipy import sparse
 
 from shaftwork.integrate import choice
-from shaftwork.integrate.engines import ENGINE_NAMES, ENGINES
+from shaftwork.integrate.engines import ENGINE_NAMES, ENGINES, GENERAL
 from shaftwork.integrate.stiffness import norm
 
 
@@ -94,7 +94,7 @@ def test_the_protocol_loads_no_numerical_library():
 
 
 def test_every_engine_of_the_table_can_be_loaded():
-    for name in ENGINES:
+    for name in (name for name, entry in ENGINES.items() if entry.module):
         assert callable(choice.load(name))
 
 
@@ -126,4 +126,10 @@ def test_the_bound_of_the_eigenvalues_of_a_slow_system_is_as_slow() -> None:
 
 
 def test_every_engine_can_be_asked_for() -> None:
-    assert set(ENGINE_NAMES) == {"auto", *ENGINES, "wave"}
+    assert ("auto", *(name for name, entry in ENGINES.items() if not entry.part_of)) == ENGINE_NAMES
+    assert set(GENERAL) == {*ENGINE_NAMES} - {"auto", "wave"}
+
+
+def test_every_engine_that_names_another_one_names_one_of_the_table() -> None:
+    assert {entry.unless_stiff for entry in ENGINES.values()} - {""} <= ENGINES.keys()
+    assert {entry.part_of for entry in ENGINES.values()} - {""} <= set(GENERAL)

@@ -15,15 +15,15 @@ from scipy.integrate import solve_ivp
 
 import shaftwork as sw
 from shaftwork.core.errors import AccuracyWarning
-from shaftwork.integrate.engines import ENGINES, available
+from shaftwork.integrate.engines import ENGINES, GENERAL, available
 from tests.properties.examples import share_of_examples
 
 STIFFNESS, TORQUE, PERIODS = 1000.0, 10.0, 3.0
-INSTALLED = tuple(name for name in ENGINES if available(name))
-EXPLICIT = ("scipy", "heyoka")
+INSTALLED = tuple(name for name in GENERAL if available(name))
+EXPLICIT = tuple(name for name in GENERAL if ENGINES[name].explicit)
 # Of the largest torque, at rtol 1e-8: what adds up over thousands of steps on the edge of stability. CVODE, of order
 # five, is itself at 4e-6 after some periods without damping.
-BOUND = {"sundials": 1e-5} | dict.fromkeys(("exact", "heyoka", "scipy", "scipy-radau", "banded"), 1e-6)
+BOUND = dict.fromkeys(INSTALLED, 1e-6) | {"sundials": 1e-5}
 
 
 def two_inertias(ratio: float, heavy: float, *, beside: bool = False, load: float = 0.0) -> tuple[sw.Network, float]:

@@ -364,6 +364,22 @@ def test_a_train_that_nothing_drives_is_told_by_its_motion() -> None:
     driven.simulate(0.01)
 
 
+def test_a_gap_that_is_open_drives_no_train() -> None:
+    """It has a torque beyond its limits alone."""
+    net = sw.Network("two trains")
+    net.add(sw.TorqueSource("motor", tau=1.0), "a")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.Inertia("J2", J=1.0), "b")
+    net.add(sw.Backlash("gap", gap=0.1, c=1e4, d=10.0), "b", "c")
+    net.add(sw.Inertia("J3", J=1.0), "c")
+    net.add(sw.Inertia("J4", J=1.0), "a")
+    (problem,) = net.check()
+    assert problem.kind == "separate train"
+    assert "nothing drives that train" in problem.message
+    with pytest.warns(sw.NetworkWarning, match="stays at rest: .*'J2', 'gap', 'J3'"):
+        net.simulate(0.1)
+
+
 @pytest.mark.parametrize("node", ["Ground", "GROUND"])
 def test_a_node_that_is_written_like_the_frame_is_told_apart(node: str) -> None:
     net = sw.Network("braked")

@@ -108,10 +108,18 @@ class CompiledModel:
 
     def __init__(self, form: StateForm) -> None:
         self.form = form
-        self.parameters: Mapping[str, float] = MappingProxyType(dict(form.graph.parameters))
-        self.defaults = np.array(list(self.parameters.values()), dtype=float)
         self._bound = BoundedCache[bytes, BoundArrays](1)
         self._machine: MachineCode | None = None
+
+    @cached_property
+    def parameters(self) -> Mapping[str, float]:
+        """Every parameter that is left in a law, "part.parameter" to value in SI."""
+        return MappingProxyType(dict(self.form.graph.parameters))
+
+    @cached_property
+    def defaults(self) -> Array:
+        """The parameter vector of the network."""
+        return np.array([*{**self.form.graph.parameters, **self.parameters}.values()], dtype=float)
 
     @cached_property
     def arrays(self) -> ArrayProgram:
@@ -160,9 +168,9 @@ class CompiledModel:
         """
         p = self.defaults.copy()
         if changed:
-            places = {name: k for k, name in enumerate(self.parameters)}
+            places = {name: k for k, name in enumerate(self.form.graph.parameters)}
             for name, value in changed.items():
-                if name not in places:
+                if name not in self.parameters:
                     raise ParameterError(
                         f"The model has no parameter '{name}'. It has: {', '.join(self.parameters) or 'none'}."
                     )

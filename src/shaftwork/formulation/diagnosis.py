@@ -20,14 +20,14 @@ from shaftwork.formulation.gains import value_of
 from shaftwork.formulation.tree import column_of
 from shaftwork.formulation.value_diagnosis import extreme_ratios, notes_of, numeric_problems
 from shaftwork.formulation.view import View, controlled_problems, domain_words, reads_itself
-from shaftwork.network.checks import LEFT_OUT, connection_problems, examine
+from shaftwork.network.checks import LEFT_OUT, SEPARATE, connection_problems, examine
 from shaftwork.network.graph import CircuitGraph, GraphBranch, GraphPart, build_graph
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import Netlist, at_nodes, listed, title
 
 _LACKING = (
     *("floating part", "loose end", "controlled source", "massless node", "algebraic loop", "undetermined speed"),
-    "separate train",
+    SEPARATE,
 )
 """Kinds that say that something is missing at a node; each is said only where none before it says so already."""
 _OF_VALUES = (

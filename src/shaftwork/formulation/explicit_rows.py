@@ -76,7 +76,7 @@ class _Solution:
         carried = zip(form.states, self.states, strict=True)
         symbols = {(state.kind, state.branch): symbol for state, symbol in carried}
         self.loops = _exact(form, form.tree.loops)
-        self.balances = self.loops if form.tree.cutsets is form.tree.loops else _exact(form, form.tree.cutsets)
+        self.balances = _exact(form, form.tree.cutsets) if form.loses_power else self.loops
         self.cutsets: dict[int, list[tuple[int, Expr]]] = {}
         for link, row in self.balances.items():
             for tree, gain in row:

@@ -62,6 +62,11 @@ class StateForm:
         return self.graph.in_network_symbols(self.graph.branches[branch].template.law, self.graph.branches[branch])
 
     @property
+    def loses_power(self) -> bool:
+        """Whether a coupling does: then torques have other ratios than speeds, and cutsets other gains than loops."""
+        return self.tree.cutsets is not self.tree.loops
+
+    @property
     def across_sources(self) -> tuple[int, ...]:
         """Prescribed across variables: speeds, voltages."""
         return self.tree.tree[Kind.ACROSS_SOURCE]

@@ -86,7 +86,7 @@ def with_inputs(form: StateForm, places: Sequence[Place]) -> tuple[StateForm, tu
     graph, tree = form.graph, form.tree
     branches, parts, members = list(graph.branches), list(graph.parts), list[int]()
     loops = dict(tree.loops)
-    cutsets = loops if tree.cutsets is tree.loops else dict(tree.cutsets)
+    cutsets = dict(tree.cutsets) if form.loses_power else loops
     for place in places:
         if place.branch >= 0:
             members.append(place.branch)

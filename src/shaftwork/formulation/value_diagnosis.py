@@ -26,7 +26,7 @@ from shaftwork.network.netlist import at_nodes, listed, title
 def numeric_problems(form: StateForm) -> tuple[Diagnostic, ...]:
     """Values that cancel each other or lie outside what a computer can represent, although the structure is sound."""
     graph, loops, cutsets = form.graph, form.tree.loops, form.tree.cutsets
-    rows = (*loops.items(), *(cutsets.items() if cutsets is not loops else ()))
+    rows = (*loops.items(), *(cutsets.items() if form.loses_power else ()))
     gains = ((link, entry) for link, row in rows for entry in row.values() if isinstance(entry, Gain))
     if wild := sorted({link for link, gain in gains if not (math.isfinite(gain.value) and gain.value)}):
         return (extreme_ratios(graph, (branch for link in wild for branch in (link, *loops[link]))),)
@@ -50,7 +50,7 @@ def jamming(form: StateForm, parameters: Mapping[str, float]) -> Iterator[Diagno
         (form.across_states, form.dependent_across),
         (form.dependent_through, form.through_states),
     )
-    if form.tree.cutsets is form.tree.loops:
+    if not form.loses_power:
         return
     sign = _sign_of_tree(form, column_of, parameters) * _sign_of_tree(form, balance_of, parameters)
     for trees, links in groups:
@@ -71,8 +71,6 @@ def self_locks(form: StateForm, parameters: Mapping[str, float]) -> bool:
         form: the equations.
         parameters: values by name.
     """
-    if form.tree.cutsets is form.tree.loops:
-        return False
     lossy = (branch for branch in form.graph.branches if branch.template.through)
     pairs = ((branch, *pair) for branch in lossy for pair in zip(branch.terms, branch.balances, strict=True))
     powers = (form.graph.in_network_symbols(term[0] * balance[0], branch) for branch, term, balance in pairs)

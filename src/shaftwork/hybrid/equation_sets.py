@@ -17,18 +17,10 @@ from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, ModeNames, machines_of, with_laws_of_rest, with_modes
 from shaftwork.hybrid.modes.reactions import MANY, ReactionEquations, laws_that_hold
 from shaftwork.integrate import choice
-from shaftwork.integrate.engines import ADAMS, ENGINES, INNER, WAVE, available
+from shaftwork.integrate.engines import ENGINES, GENERAL
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.model import Model
-
-FOLLOWING = {
-    name: entry.following
-    for name, entry in (*ENGINES.items(), *INNER.items(), ("wave", WAVE))
-    if entry.following is not None
-}
-"""Engines that follow guards: the part of the tolerance that they run with, and the loosest one."""
-_ENGINES = ", ".join(sorted(name for name in FOLLOWING if name not in (ADAMS, "wave")))
 
 
 class EquationSets:
@@ -41,9 +33,11 @@ class EquationSets:
 
     kind: ClassVar[type[ModeEquations]] = ModeEquations
     """Of the sets of equations."""
+    model_kind: ClassVar[type[Model]] = Model
+    """Of the models of one phase."""
 
     def __init__(self, base: Model, rebuild: Callable[[Netlist], Model]) -> None:
-        self.netlist, self._rebuild = base.netlist, rebuild
+        self.netlist, self._form, self._rebuild = base.netlist, base.form, rebuild
         self.machines = machines_of(base.form.graph)
         self.first: ModeNames = tuple(machine.first for machine in self.machines)
         self._by_forms: dict[tuple[str, ...], ModeEquations | NetworkError] = {}
@@ -63,12 +57,7 @@ class EquationSets:
         forms = tuple(machine.modes[name].form for machine, name in zip(self.machines, modes, strict=True))
         if forms not in self._by_forms:
             try:
-                with muted(NetworkWarning):  # of the network as it is wired compilation has warned
-                    netlist = self._netlist(forms)
-                    model = self._rebuild(netlist)
-                    if (resting := with_laws_of_rest(netlist, model.form)) is not netlist:
-                        model = self._rebuild(resting)
-                equations: ModeEquations | NetworkError = self.kind(model, self.machines, forms)
+                equations: ModeEquations | NetworkError = self.kind(self._model(forms), self.machines, forms)
             except NetworkError as error:
                 equations = error
             self._by_forms.setdefault(forms, equations)  # another thread may have been first
@@ -76,6 +65,18 @@ class EquationSets:
         if isinstance(equations, NetworkError):
             raise equations.with_traceback(None)  # else it would keep the frames of every time that it was raised
         return equations
+
+    def _model(self, forms: tuple[str, ...]) -> Model:
+        """The model in a combination of forms; the first one has been assembled when the network was compiled."""
+        netlist = self._netlist(forms)
+        is_first = forms == tuple(machine.modes[machine.first].form for machine in self.machines)
+        model = self.model_kind(self._form, netlist, self._rebuild) if is_first else self._assembled(netlist)
+        resting = with_laws_of_rest(netlist, model.form)
+        return model if resting is netlist else self._assembled(resting)
+
+    def _assembled(self, netlist: Netlist) -> Model:
+        with muted(NetworkWarning):  # of the network as it is wired compilation has warned
+            return self._rebuild(netlist)
 
     def first_equations(self, values: Mapping[str, float]) -> tuple[ModeEquations, Array]:
         """The equations in the first mode of each machine, and their parameters: start values are read in these.
@@ -108,7 +109,8 @@ class EquationSets:
         slipping = self._slipping[forms]
         if slipping is None or not (slipping.suits(engine) or (len(able) >= MANY and engine != "heyoka")):
             return self.of(modes)
-        if self_locks(slipping.model.form, {**slipping.model.parameters, **values}):
+        form = slipping.model.form
+        if form.loses_power and self_locks(form, {**slipping.model.parameters, **values}):
             return self.of(modes)  # whether it jams depends on what is held
         if (forms, holding) not in self._holding:
             self._holding[forms, holding] = slipping.holding(holding)
@@ -166,24 +168,27 @@ class EquationSets:
         key = equations, modes, engine
         if engine != "auto":
             choice.check(engine)
-            if engine not in FOLLOWING or engine == "wave":
+            entry = ENGINES[engine]
+            if entry.following is None:
+                following = sorted(name for name in GENERAL if ENGINES[name].following is not None)
                 raise ParameterError(
                     f"The engine '{engine}' follows no parts that change their mode "
-                    f"({', '.join(machine.name for machine in self.machines)}). Take one of: {_ENGINES}."
+                    f"({', '.join(machine.name for machine in self.machines)}). Take one of: {', '.join(following)}."
                 )
-            if engine != "sundials":
+            if not entry.unless_stiff:
                 return engine, "asked for"
             if key not in self._engines:
-                adams = ADAMS, "asked for; the motion is not stiff, so Adams' formulas are taken."
-                self._engines[key] = (engine, "asked for") if choice.is_stiff(problem()) else adams
+                other = entry.unless_stiff
+                why = f"asked for; the motion is not stiff, so {ENGINES[other].method} is taken."
+                self._engines[key] = (engine, "asked for") if choice.is_stiff(problem()) else (other, why)
             return self._engines[key]
         if key not in self._engines:
             easy = self._easy.setdefault(equations, {})
             if easy.keys() >= {*enumerate(modes)}:  # each of them was no trouble beside others
                 return next(iter(easy.values()))
             name, why = choice.choose(problem())
-            if name not in FOLLOWING:  # that of long chains
-                name = "sundials" if available("sundials") else "scipy-radau"
+            if ENGINES[name].following is None:  # that of long chains
+                name = choice.implicit()
             if name == "heyoka":
                 easy |= dict.fromkeys(enumerate(modes), (name, why))
             self._engines[key] = name, why

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from itertools import islice
 from types import MappingProxyType
 
@@ -46,8 +47,16 @@ class EventIteration:
     ) -> None:
         self.machines = equation_sets.machines
         self.transfer = HybridTransfer(equation_sets, values, span, equations or equation_sets.of)
-        self.impacts = Impacts(self.transfer, together=equation_sets.netlist.impacts == "together")
-        self._commutation = Commutation(self.transfer)
+        self._together = equation_sets.netlist.impacts == "together"
+
+    @cached_property
+    def impacts(self) -> Impacts:
+        """What happens where speeds change at once."""
+        return Impacts(self.transfer, together=self._together)
+
+    @cached_property
+    def _commutation(self) -> Commutation:
+        return Commutation(self.transfer)
 
     def in_start_modes(self, t: float, x: Array, rigid: Mapping[int, str] = MappingProxyType({})) -> HybridState:
         """The modes in which a motion starts, from the states of the equations in which no machine is rigid.

@@ -50,10 +50,14 @@ class PhaseModel(CompiledModel):
 
     def __init__(self, form: StateForm, name: str, numbers: Mapping[str, float]) -> None:
         super().__init__(form)
-        self.name = name
-        of_laws = {key: value for key, value in numbers.items() if key in self.parameters}
-        self.parameters = MappingProxyType({**self.parameters, **of_laws})
-        self.defaults = np.array(list(self.parameters.values()), dtype=float)
+        self.name, self._mode_numbers = name, numbers
+
+    @cached_property
+    def parameters(self) -> Mapping[str, float]:
+        """Those of the network, and the numbers of the modes that stand in laws."""
+        return MappingProxyType(
+            {k: self._mode_numbers.get(k, value) for k, value in self.form.graph.parameters.items()}
+        )
 
     def __repr__(self) -> str:
         return f"<PhaseModel of '{self.form.graph.name}', {self.name}: {', '.join(self.states) or 'no states'}>"
@@ -84,6 +88,12 @@ class HybridModel(Model):
     """
 
     phased = True
+
+    @cached_property
+    def parameters(self) -> Mapping[str, float]:
+        """Those of the network, without the numbers of modes."""
+        numbers = {machine.number for machine in self.equation_sets.machines}
+        return MappingProxyType({k: value for k, value in self.form.graph.parameters.items() if k not in numbers})
 
     @cached_property
     def states(self) -> tuple[str, ...]:

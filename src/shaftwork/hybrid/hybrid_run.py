@@ -23,7 +23,7 @@ from shaftwork.codegen.undefined_laws import refuse_vanishing
 from shaftwork.core.errors import AccuracyWarning, NetworkError, ParameterError, SimulationError
 from shaftwork.core.notices import warn
 from shaftwork.hybrid.commutation import takeovers
-from shaftwork.hybrid.equation_sets import FOLLOWING, EquationSets
+from shaftwork.hybrid.equation_sets import EquationSets
 from shaftwork.hybrid.event_iteration import EventIteration
 from shaftwork.hybrid.hybrid_state import EventOutcome, HybridState, Regime, Transition
 from shaftwork.hybrid.in_place_events import InPlaceEvents, Phase
@@ -31,6 +31,7 @@ from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, with_modes
 from shaftwork.hybrid.modes.starts import refuse_incomplete, warn_of_what_may_have_begun
 from shaftwork.integrate import choice
+from shaftwork.integrate.engines import ENGINES
 from shaftwork.integrate.problem import Problem, SeriesError, Trajectory, changed
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.implicit import PRESCRIBED, without_states
@@ -270,10 +271,12 @@ class HybridRun:
         """One run of an engine, up to other equations or an instant at which an input jumps; what goes on then."""
         regime, form = state.regime, state.regime.form
         bind = partial(regime.equations.bound, regime.p)
-        refuse_vanishing(form, bind, lambda: np.array([t]), lambda _: state.x[None])
+        if form.doubtful:
+            refuse_vanishing(form, bind, lambda: np.array([t]), lambda _: state.x[None])
         trajectory, in_place = self._followed(t, state)
         in_place.close()
-        refuse_vanishing(form, bind, lambda: trajectory.dense.steps, trajectory.dense)
+        if form.doubtful:
+            refuse_vanishing(form, bind, lambda: trajectory.dense.steps, trajectory.dense)
         self.steps += trajectory.statistics.get("steps", 0)
         assert trajectory.end is not None  # noqa: S101 (engines that follow guards say it)
         t, x = trajectory.end
@@ -344,7 +347,9 @@ class HybridRun:
     def _solve(
         self, problem: Problem, name: str, why: str, solver: Callable[[Problem], Trajectory] | None = None
     ) -> Trajectory:
-        share, loosest = FOLLOWING[name]
+        entry = ENGINES[name]
+        assert entry.following is not None  # noqa: S101 (`EquationSets.engine` refuses others)
+        share, loosest = entry.following
         # nearer to rounding than this no engine gets more exact
         tight = max(min(share * problem.rtol, loosest), min(problem.rtol, 1e-14))
         if tight != problem.rtol:
@@ -353,5 +358,5 @@ class HybridRun:
         if trajectory.caveat:
             warn(trajectory.caveat, AccuracyWarning)
         if not self.engine:
-            self.engine, self.why = name.removesuffix("-adams"), why
+            self.engine, self.why = entry.part_of or name, why
         return trajectory

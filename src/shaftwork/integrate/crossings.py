@@ -16,12 +16,6 @@ Dense = Callable[[Array], Array]
 
 # Where in a step the switches are looked at before `LOOKS`.
 FIRST = np.array([0.47])
-# A step ends past its switch, by so much that no state moves there by more than this part of its tolerance. One that
-# ends past it by less than the second part stands.
-PAST, BEARABLE = 0.01, 0.04
-# A motion that passes the same switch so many times in a row within its tolerance rests there, until it leaves it by
-# some tolerances.
-RESTING, LEFT = 50, 10.0
 
 
 def tolerance(problem: Problem | DaeProblem, x: Array) -> Array:
@@ -41,10 +35,14 @@ class Crossings:
     Args:
         problem: what is being solved.
         piece: the piece.
+        resting: a motion that passes the same switch so many times in a row within its tolerance rests there,
+        left: until it leaves it by so many tolerances.
     """
 
-    def __init__(self, problem: Problem | DaeProblem, piece: SmoothInterval) -> None:
-        self._problem, self._piece = problem, piece
+    def __init__(
+        self, problem: Problem | DaeProblem, piece: SmoothInterval, *, resting: int = 50, left: float = 10.0
+    ) -> None:
+        self._problem, self._piece, self._resting, self._left = problem, piece, resting, left
         self._clearance = CLEARANCE * float(np.spacing(max(abs(problem.t0), abs(problem.t_end))))
         self._start, self._attempts = np.nan, 0
         self._rests, self._within = np.zeros(0, dtype=np.intp), 0
@@ -52,7 +50,7 @@ class Crossings:
     @property
     def rests(self) -> bool:
         """Whether the motion has passed switches again and again, and never left one by some tolerances."""
-        return self._within >= RESTING
+        return self._within >= self._resting
 
     def cut(self, start: float, x: Array, end: float, y: Array, dense: Dense, *, again: bool = True) -> float | None:
         """The time in s at which a step has to end and the method has to start anew, or None where it meets no switch.
@@ -83,15 +81,16 @@ class Crossings:
             self._within += 1
             return None
         row, columns = met
-        past = min(PAST * self._longest(look, row), end - start)
+        # It ends past its switch, by so much that no state moves there by more than a hundredth of its tolerance.
+        past = min(0.01 * self._longest(look, row), end - start)
         time, column = min((look.root(row, column, past / 8), column) for column in columns)
-        stands = end - time <= max(BEARABLE / PAST * past, self._clearance)
+        stands = end - time <= max(4 * past, self._clearance)
         target = end if stands else time + max(past, self._clearance / 2)
         if again and not stands:
             # what breaks away begins without acceleration: for many such steps rounding keeps it where it starts
             self._rests[column] += look.values[0, column] == 0
             return self._settled(start, end, target)
-        near = abs(look.values[0, column]) <= LEFT * band[column]
+        near = abs(look.values[0, column]) <= self._left * band[column]
         self._rests[column], self._within = (self._rests[column] + 1, self._within + 1) if near else (0, 0)
         return target
 
@@ -125,8 +124,8 @@ class Crossings:
         """The switches (m,) at which the motion does not rest; step control alone sees the others."""
         if not self._rests.size:
             self._rests = np.zeros(values.size, dtype=np.intp)
-        self._rests[np.abs(values) > LEFT * band] = 0
-        return self._rests < RESTING
+        self._rests[np.abs(values) > self._left * band] = 0
+        return self._rests < self._resting
 
 
 class Look:

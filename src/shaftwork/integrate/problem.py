@@ -338,6 +338,12 @@ class Trajectory:
 
 
 class Engine(Protocol):
-    """An engine solves a `Problem` or raises `SimulationError` with the time, the state and the reason."""
+    """An engine solves a `Problem`, or raises `SimulationError` with the time, the state and the reason.
+
+    It is a function of the problem, and `integrate/engines.py` has an entry for it. It ends a step at every breakpoint
+    and goes on from `jump`, as well as where a switch changes its sign. It gives up after `max_steps`, never returns a
+    state that is not finite, and calls `progress` after its steps. Where its entry has `following` it ends at the first
+    guard that is met. For a method of single steps `stepping.march` does all this.
+    """
 
     def __call__(self, problem: Problem) -> Trajectory: ...

@@ -7,22 +7,21 @@ from contextlib import contextmanager
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from scipy.integrate import DOP853, OdeSolution, Radau
+from scipy.integrate import DOP853, Radau
 
 from shaftwork.core.errors import SimulationError
+from shaftwork.integrate.crossings import Dense
 from shaftwork.integrate.engines import ENGINES
 from shaftwork.integrate.guards import BRIEF
 from shaftwork.integrate.linear.rounding_errors import cancellation
 from shaftwork.integrate.problem import Array, Problem, Trajectory, tightened
-from shaftwork.integrate.smooth_intervals import GuardedFunctions, PiecewiseDense, SmoothInterval, failure, reached
-from shaftwork.integrate.stepping import Step, SteppedRun, march
+from shaftwork.integrate.smooth_intervals import GuardedFunctions, SmoothInterval, failure
+from shaftwork.integrate.stepping import Step, SteppedRun, march, trajectory
 from shaftwork.integrate.stiffness import STABLE, bound_of_decay, jacobians, rates
 
 Method = Literal["DOP853", "Radau"]
 
 METHODS: dict[str, Any] = {"DOP853": DOP853, "Radau": Radau}
-
-FINEST = ENGINES["scipy"].finest
 
 # A run is made again where the torques of dampers may be off by more than this factor times the tolerance.
 BEARABLE = 2.0
@@ -51,41 +50,29 @@ def solve(problem: Problem, method: Method = "DOP853") -> Trajectory:
         factor = cancellation(problem, times[few], states[few])
         if BEARABLE < factor < 1 / np.finfo(float).eps:  # it is beyond all bounds where nothing has moved yet
             # On the edge of stability errors are some 50 times as large as the tolerance that is asked for.
-            share = max(1 / (50 * factor), FINEST / problem.rtol)
+            share = max(1 / (50 * factor), ENGINES["scipy"].finest / problem.rtol)
             decay = rates(jacobians(problem)).decay
             # A longer step than is stable may well end right, because what is left of the fast motion is tiny at its
             # start, and yet be off inside by much more than the torque of a damper bears.
             again = _run(tightened(problem, share), method, longest=STABLE / decay if decay > 0 else np.inf)
-            run = _Run(again.march, again.dense, {name: run.counts[name] + again.counts[name] for name in run.counts})
-    whole, dense = run.march, run.dense
-    if problem.t_eval is None:
-        t, states = whole.both_sides(problem)
-    else:
-        t = reached(problem.t_eval, whole.end[0])
-        states = dense(t)
-    return Trajectory(t, states, dense, run.counts, met=whole.met, end=whole.end)
+            run = _Run(again.march, again.parts, {name: run.counts[name] + again.counts[name] for name in run.counts})
+    return trajectory(problem, run.march, run.parts, run.counts)
 
 
 class _Run(NamedTuple):
-    """All steps, dense output and counts by name."""
+    """All steps, dense output of each, and counts by name."""
 
     march: SteppedRun
-    dense: PiecewiseDense
+    parts: list[Dense]
     counts: dict[str, int]
 
 
 def _run(problem: Problem, method: Method, longest: float = np.inf) -> _Run:
     """A run in steps of at most `longest` s."""
     stepper = _ScipyStepper(problem, method, longest)
-    with np.errstate(all="ignore"):
-        whole = march(problem, stepper)
-    solutions = [
-        _rows(OdeSolution(piece.times, parts)) for piece, parts in zip(whole.pieces, stepper.parts, strict=True)
-    ]
-    starts = np.array([piece.times[0] for piece in whole.pieces])
-    dense = PiecewiseDense(starts, tuple(solutions), whole.steps, problem.x0.size)
+    whole = march(problem, stepper)
     counts = {"steps": whole.steps.size - 1, **dict(zip(("rhs", "jacobians"), stepper.calls, strict=True))}
-    return _Run(whole, dense, counts)
+    return _Run(whole, stepper.parts, counts)
 
 
 def _on_edge(problem: Problem, steps: Array) -> bool:
@@ -127,8 +114,8 @@ class _ScipyStepper:
         self._problem, self._method, self._longest = problem, method, longest
         self._solver: Any = None
         self._calls = (0, 0)
-        self.parts: list[list[Any]] = []
-        """Of each piece, the dense output of its steps."""
+        self.parts: list[Dense] = []
+        """Dense output of the steps that were taken."""
 
     @property
     def calls(self) -> tuple[int, int]:
@@ -138,7 +125,6 @@ class _ScipyStepper:
     def open(self, piece: SmoothInterval, t: float, x: Array) -> Array:
         if t == piece.start:
             self._piece, self._functions = piece, GuardedFunctions(self._problem, piece)
-            self.parts.append([])
         self._begin(t, x, piece.end, self._longest)
         return x
 
@@ -154,20 +140,20 @@ class _ScipyStepper:
             raise self._failure(t, x if np.isfinite(x).all() else solver.y, reason)
         if not np.isfinite(solver.y.sum()):
             raise self._failure(solver.t, solver.y, "the state is not finite")
-        self._dense = solver.dense_output()
-        return Step(solver.t, solver.y, _rows(self._dense))
+        self._dense = _rows(solver.dense_output())
+        return Step(solver.t, solver.y, self._dense)
 
     def again(self, t: float, x: Array, end: float, longest: float) -> None:
         self._begin(t, x, end, min(longest, self._longest))
 
     def take(self, t: float, end: float, state: Array) -> None:  # noqa: ARG002 (its dense output has all)
-        self.parts[-1].append(self._dense)
+        self.parts.append(self._dense)
 
     def _begin(self, t: float, x: Array, end: float, longest: float) -> None:
         if self._solver is not None:
             self._calls = self.calls
         problem, functions = self._problem, self._functions
-        options: dict[str, Any] = {"rtol": max(problem.rtol, FINEST), "atol": problem.atol, "max_step": longest}
+        options: dict[str, Any] = {"rtol": problem.rtol, "atol": problem.atol, "max_step": longest}
         if self._method != "DOP853" and problem.jacobian is not None:
             options["jac"] = functions.jacobian
         with self._told(t, x):
@@ -187,6 +173,6 @@ class _ScipyStepper:
         return failure(self._problem, "scipy", t, x, f"{self._method}: {reason}", self._functions)
 
 
-def _rows(dense: Callable[[Array], Array]) -> Callable[[Array], Array]:
+def _rows(dense: Callable[[Array], Array]) -> Dense:
     """Dense output with a row for each time, where scipy's has a column."""
     return lambda times: np.asarray(dense(times)).T

@@ -123,9 +123,10 @@ def piecewise(starts: Array, parts: Sequence[Callable[[Array], Array]], size: in
     times = np.atleast_1d(np.asarray(times, dtype=float))
     index = np.clip(np.searchsorted(starts, times, side="right") - 1, 0, len(parts) - 1)
     states = np.empty((times.size, size))
-    for number in np.unique(index):
-        chosen = index == number
-        states[chosen] = parts[number](times[chosen])
+    order = np.argsort(index, kind="stable")
+    for chosen in np.split(order, np.flatnonzero(np.diff(index[order])) + 1):
+        if chosen.size:
+            states[chosen] = parts[index[chosen[0]]](times[chosen])
     return states
 
 
@@ -164,12 +165,6 @@ def failure(
     """
     if (error := _without_value(problem, t, x, guard)) is not None:
         return error
-    if engine == "heyoka" and isinstance(problem, Problem) and (law := _near(problem, problem.rough, t, x)) is not None:
-        return SimulationError(
-            f"The heyoka engine failed at t = {law[0]:.9g} s: {law[1]} has a value there, but not all its branches and "
-            "slopes have one, and a Taylor series computes even those whose condition does not hold. Take "
-            "engine='scipy', or give each a value: a root, a logarithm or a quotient of Max(1e-9, ...)."
-        )
     reason = reason if guard is None else guard.reason(reason)
     if problem.names:
         bad = np.flatnonzero(~np.isfinite(x))
@@ -187,15 +182,23 @@ def failure(
 
 def _without_value(problem: TimedProblem, t: float, x: Array, guard: GuardedFunctions | None) -> SimulationError | None:
     """The error of what has no value where a run has failed, or just after."""
-    error = _near(problem, problem.explain, t, x)
+    error = near(problem, problem.explain, t, x)
     if problem.explain is None or error is not None or guard is None or guard.not_finite is None:
         return error
     at, state, _ = guard.not_finite
     return problem.explain(np.array([at]), state[None, :]) if np.isfinite(at) and np.isfinite(state).all() else None
 
 
-def _near(problem: TimedProblem, explain: Callable[[Array, Array], T] | None, t: float, x: Array) -> T | None:
-    """What explains the failure of a run where it has come to, or just after."""
+def near(problem: TimedProblem, explain: Callable[[Array, Array], T] | None, t: float, x: Array) -> T | None:
+    """What explains the failure of a run where it has come to, or just after.
+
+    Args:
+        problem: what was to be solved.
+        explain: from times (k,) and states (k, n) to an explanation, such as `problem.explain`; None where there is
+            none.
+        t: last time reached, s.
+        x: (n,) state there.
+    """
     if explain is None:
         return None
     rates = problem.rhs(t, x) if isinstance(problem, Problem) else np.zeros_like(x)

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from shaftwork.integrate.crossings import Crossings
+from shaftwork.integrate.crossings import Crossings, Dense
 from shaftwork.integrate.guards import GuardWatch
-from shaftwork.integrate.problem import Array, DaeProblem, Problem, TimedProblem
-from shaftwork.integrate.smooth_intervals import SmoothInterval, both_sides, failure, pieces, start_of_piece, used_up
-
-# A run has stalled when so many steps together advance by less than so many times this part of the whole time.
-STALL_STEPS, STALL_SPAN = 2000, 1e-10
+from shaftwork.integrate.problem import Array, DaeProblem, Problem, TimedProblem, Trajectory
+from shaftwork.integrate.smooth_intervals import (
+    PiecewiseDense,
+    SmoothInterval,
+    both_sides,
+    failure,
+    pieces,
+    reached,
+    start_of_piece,
+    used_up,
+)
 
 
 class Step(NamedTuple):
@@ -28,11 +34,15 @@ class Step(NamedTuple):
 
     end: float
     state: Array
-    dense: Callable[[Array], Array]
+    dense: Dense
 
 
 class Stepper(Protocol):
-    """A method as the loop uses it."""
+    """A method as the loop uses it: what it makes is looked at by `march`, and then taken or made again.
+
+    Its right-hand side and Jacobian are those of `smooth_intervals.GuardedFunctions`, which asks nothing outside the
+    piece and remembers what was not finite, and `smooth_intervals.failure` makes its errors.
+    """
 
     engine: str
     """Its name in messages."""
@@ -40,23 +50,43 @@ class Stepper(Protocol):
     """Whether a step may be cut off at a switch of a law, as no stage of it lies beyond; else it is made again."""
 
     def open(self, piece: SmoothInterval, t: float, x: Array) -> Array:
-        """Begin anew at a time in s of a piece in a state (n,); the consistent state (n,) with which it begins."""
+        """Begin anew in a state (n,): at the start of a piece, or at a time in s inside it, just past a switch.
+
+        Returns:
+            The state (n,) with which it begins, that of the argument unless equations bind the states.
+        """
         ...
 
     def step(self, t: float, x: Array) -> Step | None:
-        """Make a step from where the last one was taken to; None where it was too long, and a shorter one is to follow.
+        """Make a step from a time in s and a state (n,), up to the end of the piece at most.
+
+        Returns:
+            The step; None where its error was too large, and a shorter one is to follow.
 
         Raises:
-            SimulationError: it cannot.
+            SimulationError: it cannot, or a value is not finite.
         """
         ...
 
     def again(self, t: float, x: Array, end: float, longest: float) -> None:
-        """Make the next step from the start of the last one once more, up to an end in s, in steps of `longest` s."""
+        """Forget the last step; the next ones start there once more, and none ends beyond a switch.
+
+        Args:
+            t: where it started, s.
+            x: (n,) state there.
+            end: up to which they go at most, s; from there on the piece goes on to its own end.
+            longest: a step at most, s.
+        """
         ...
 
     def take(self, t: float, end: float, state: Array) -> None:
-        """Keep the last step, from a time in s up to an end in s with its state (n,): its own end, or one before it."""
+        """Keep the last step: dense output is asked for later.
+
+        Args:
+            t: where it started, s.
+            end: its own end in s, or one before it where a guard or a switch cuts it off.
+            state: (n,) there.
+        """
         ...
 
 
@@ -108,6 +138,7 @@ class SteppedRun(NamedTuple):
         return both_sides(problem, times, [np.array(piece.states) for piece in self.pieces])
 
 
+@np.errstate(all="ignore")
 def march(problem: Problem | DaeProblem, stepper: Stepper) -> SteppedRun:
     """Step through all pieces of a problem, up to the first guard that is met.
 
@@ -153,14 +184,39 @@ def march(problem: Problem | DaeProblem, stepper: Stepper) -> SteppedRun:
     return SteppedRun(done, None)
 
 
+def trajectory(
+    problem: Problem, run: SteppedRun, parts: Sequence[Dense], statistics: Mapping[str, int] | None = None
+) -> Trajectory:
+    """What an engine returns of a run whose steps have dense output that lasts.
+
+    Args:
+        problem: what was solved.
+        run: from `march`.
+        parts: dense output of each step that was taken, in order.
+        statistics: counts by name beside that of the steps.
+    """
+    steps = run.steps
+    dense = PiecewiseDense(steps[:-1], tuple(parts), steps, problem.x0.size)
+    if problem.t_eval is None:
+        t, x = run.both_sides(problem)
+    else:
+        t = reached(problem.t_eval, run.end[0])
+        x = dense(t)
+    counts = {"steps": steps.size - 1, **(statistics or {})}
+    return Trajectory(t, x, dense, counts, met=run.met, end=run.end)
+
+
 class Pace:
     """Tells a run that goes on, in ever shorter steps, from one that has stalled; and whoever asks, how far it is.
 
     Args:
         problem: what is being solved.
+        every: after so many steps it is looked whether the run has stalled.
+        least: a run has where these steps were on average shorter than this part of the whole time.
     """
 
-    def __init__(self, problem: TimedProblem) -> None:
+    def __init__(self, problem: TimedProblem, *, every: int = 2000, least: float = 1e-10) -> None:
+        self._every, self._least = every, least
         self._progress, self._duration = problem.progress, problem.t_end - problem.t0
         self._since, self._steps = problem.t0, 0
 
@@ -174,15 +230,15 @@ class Pace:
         if self._progress is not None:
             self._progress(t)
         self._steps += 1
-        if self._steps % STALL_STEPS:
+        if self._steps % self._every:
             return None
         advance, self._since = t - self._since, t
         # Where it rests, ten million such steps would make a run. Where a law is as the square root of the speed, such
         # a run would not end otherwise.
-        if advance >= STALL_STEPS * (1e-7 if rests else STALL_SPAN) * self._duration:
+        if advance >= self._every * (1e-7 if rests else self._least) * self._duration:
             return None
         return (
-            f"the last {STALL_STEPS} steps advanced by {advance:.2g} s only, as where the laws on both sides of a jump "
+            f"the last {self._every} steps advanced by {advance:.2g} s only, as where the laws on both sides of a jump "
             "drive the motion back to it. Give such a law a smooth transition, tanh(omega / 0.01) in place of "
             "sign(omega)"
         )

@@ -1,4 +1,4 @@
-"""How fast a system decays and oscillates: what decides between explicit and implicit engines."""
+"""What decides between engines: how fast a system decays and oscillates, and whether it is a damped chain."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from scipy.sparse.linalg import splu
 
 from shaftwork.integrate.problem import Array, Problem
 from shaftwork.integrate.smooth_intervals import pieces
+from shaftwork.numerics.tolerances import SAME
 
 # Up to here all eigenvalues are computed; beyond, norms of the balanced Jacobian bound them.
 LARGEST_EIGENVALUES = 200
@@ -59,6 +60,32 @@ def _jacobians(problem: Problem) -> Iterator[Any]:
         moved = _implicit_step(problem, time, matrix, 0.1 * (piece.end - piece.start))
         if moved is not None:
             yield sparse.csc_array(problem.jacobian(time, moved))
+
+
+def first_jacobian(problem: Problem) -> Any:
+    """The sparse Jacobian (n, n) at the start of a problem, or None where it has none."""
+    if problem.straight is not None:
+        return problem.straight.A
+    if problem.jacobian is None:
+        return None
+    return problem.jacobian(pieces(problem)[0].inside(problem.t0), problem.x0)
+
+
+def is_chain(problem: Problem) -> bool:
+    """Whether each state is joined to few others, as in chains and trees, so that factors of matrices stay sparse."""
+    matrix = first_jacobian(problem)
+    # damped springs in a chain give four entries a state at most; matrices of more than eight may fill up
+    return matrix is not None and bool(matrix.nnz <= 8 * matrix.shape[0])
+
+
+def is_undamped(problem: Problem) -> bool:
+    """Whether all motions of a passive system keep their energy, by its Jacobian at the start.
+
+    The real parts of its eigenvalues are then zero. None of them is positive where nothing drives, so it is enough that
+    their sum, the trace, is zero.
+    """
+    diagonal = first_jacobian(problem).diagonal()
+    return bool(abs(diagonal.sum()) <= SAME * np.abs(diagonal).sum())
 
 
 def _implicit_step(problem: Problem, time: float, matrix: Any, step: float) -> Array | None:

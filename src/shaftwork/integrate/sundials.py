@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -12,7 +11,6 @@ from typing import Literal
 import numpy as np
 
 from shaftwork.core.calls import unprinted
-from shaftwork.core.errors import MissingExtraError
 from shaftwork.integrate.guards import share_of_tolerance
 from shaftwork.integrate.problem import Array, DaeProblem, Problem, Trajectory, tightened
 from shaftwork.integrate.smooth_intervals import PiecewiseDense, SmoothInterval, check_finite, failure
@@ -27,10 +25,6 @@ from shaftwork.integrate.sundials_solvers import (
     open_ida,
 )
 from shaftwork.numerics.polynomials import Interpolant, interpolation_times
-
-# No tolerance is made tighter: absolute ones of small twists may be that tight.
-TIGHTEST_ATOL = 1e-17
-
 
 Opener = Callable[[SmoothInterval, Array], OpenedSolver]
 Opening = Callable[[float], Opener]
@@ -47,12 +41,10 @@ def solve(problem: Problem, method: Method = "BDF") -> Trajectory:
         method: "BDF" for stiff systems, "Adams" for smooth motion that is not.
 
     Raises:
-        MissingExtraError: scikit-sundae is not installed.
         SimulationError: SUNDIALS gave up, with its reason.
 
     Source: Hindmarsh and others, SUNDIALS: suite of nonlinear and differential/algebraic equation solvers, 2005.
     """
-    _require("engine='sundials'")
 
     def opening(share: float) -> Opener:
         tight, pattern = tightened(problem, share), JacobianPattern(len(problem.x0))
@@ -65,23 +57,16 @@ def solve_dae(problem: DaeProblem) -> Trajectory:
     """Integrate an implicit problem with IDA, from consistent initial values that IDA finds at every piece's start.
 
     Raises:
-        MissingExtraError: scikit-sundae is not installed.
         SimulationError: SUNDIALS gave up, with its reason.
 
     Source: as `solve`.
     """
-    _require("A nonlinear algebraic loop")
 
     def opening(share: float) -> Opener:
         tight = tightened(problem, share)
         return lambda piece, x: open_ida(tight, piece, x)
 
     return _trajectory(problem, opening, DEGREES["BDF"])
-
-
-def _require(purpose: str) -> None:
-    if importlib.util.find_spec("sksundae") is None:
-        raise MissingExtraError("scikit-sundae", "stiff", purpose)
 
 
 InnerTimes = Callable[[float, float], Array]
@@ -96,23 +81,28 @@ class _Marched:
     inside: list[Array]
 
 
-def _run(problem: Problem | DaeProblem, opening: Opening, inner: InnerTimes) -> _Marched:
+def _run(problem: Problem | DaeProblem, opening: Opening, inner: InnerTimes, tightest: float = 1e-17) -> _Marched:
     """All steps up to a guard; where they are few, they are made again with the tolerance that its course needs.
 
     Rebounds become ever shorter. After each a method starts with low order, and errs by its tolerance however short
     the flight is: with flights as small as the tolerance a series of rebounds would end early.
+
+    Args:
+        problem: what to solve.
+        opening: of its solvers.
+        inner: the times wanted in each step.
+        tightest: no tolerance is made tighter; absolute ones of small twists may be that tight.
     """
     share = 1.0
     while True:
         tight = tightened(problem, share)
         stepper = _SundialsStepper(tight, opening(share), inner)
-        with np.errstate(all="ignore"):
-            marched = _Marched(march(tight, stepper), stepper.inside)
-        if marched.march.met is None or tight.rtol <= TIGHTEST_ATOL:
+        marched = _Marched(march(tight, stepper), stepper.inside)
+        if marched.march.met is None or tight.rtol <= tightest:
             return marched
         if (part := share_of_tolerance(tight, marched.march.steps, marched.march.states)) > 0.5:
             return marched
-        share = max(part * share, TIGHTEST_ATOL / problem.rtol)
+        share = max(part * share, tightest / problem.rtol)
 
 
 class _SundialsStepper:

@@ -13,13 +13,14 @@ from typing import Any
 
 import networkx as nx
 import sympy
-from sympy import Integer
+from sympy import Expr, Float, Integer
 
 from shaftwork.components.base import Component
 from shaftwork.components.branches import ACROSS, INTEGRAL
+from shaftwork.components.modes import mode_symbol
 from shaftwork.core.domains import Domain
 from shaftwork.core.errors import Diagnostic, ShaftworkError
-from shaftwork.network.graph import GROUND, CircuitGraph, resolve, signals_of
+from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart, resolve, signals_of
 from shaftwork.network.kinds import Kind
 from shaftwork.network.law_faults import Fault, instead_of, law_faults
 from shaftwork.network.netlist import (
@@ -33,10 +34,13 @@ from shaftwork.network.netlist import (
     listed,
     title,
 )
-from shaftwork.network.templates import Shared
+from shaftwork.network.templates import BranchTemplate, Shared
 
 LEFT_OUT = ("node name", "node count", "wrong domain", "no effect", "component")
 """Kinds of problems whose part is left out of what is examined further."""
+
+SEPARATE = "separate train"
+"""The kind of problem of a train beside the largest one."""
 
 Train = tuple[int, ...]
 """Numbers of the parts that hang together."""
@@ -345,7 +349,7 @@ def _separate_train(graph: CircuitGraph, train: Train, main: Train, spelling: Sp
     nodes = tuple(graph.nodes[node] for node in _port_nodes(graph, train))
     others = listed(tuple(graph.parts[number].name for number in main), most=3)
     return Diagnostic(
-        "separate train",
+        SEPARATE,
         f"{listed(names)} at {at_nodes(nodes)} share{'s' * (len(names) == 1)} no node with {others}"
         + (", and nothing drives that train." if _rests(graph, train, main) else "."),
         f"Join the two{spelling.suggestion(nodes)}, or simulate them as two networks.",
@@ -363,9 +367,15 @@ def _rests(graph: CircuitGraph, train: Train, main: Train) -> bool:
 def _is_driven(graph: CircuitGraph, train: Train) -> bool:
     """Whether something in a train can set it in motion from rest."""
     parts = [graph.parts[number] for number in train]
-    laws = (graph.branches[k].template for part in parts for k in part.branches)
     return any(part.component.role == "source" for part in parts) or any(
-        template.law.xreplace(dict.fromkeys((ACROSS, INTEGRAL, *template.reads), Integer(0))) != 0
-        for template in laws
-        if template.kind in (Kind.LAW, Kind.THROUGH_SOURCE, Kind.ACROSS_SOURCE)
+        _law_at_rest(part, graph.branches[k].template) != 0
+        for part in parts
+        for k in part.branches
+        if graph.branches[k].template.kind in (Kind.LAW, Kind.THROUGH_SOURCE, Kind.ACROSS_SOURCE)
     )
+
+
+def _law_at_rest(part: GraphPart, template: BranchTemplate) -> Expr:
+    """A law of a part in its first modes, while nothing moves."""
+    modes = {mode_symbol(element.symbol): Float(element.options[0].value) for element in part.modes}
+    return template.law.xreplace({**dict.fromkeys((ACROSS, INTEGRAL, *template.reads), Integer(0)), **modes})

@@ -18,7 +18,7 @@ from shaftwork.components.tables import Table
 from shaftwork.core.domains import ROTATION, Domain
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed, overview
-from shaftwork.network.templates import BranchTemplate, Shared, Template, make_template, with_factors
+from shaftwork.network.templates import BranchTemplate, Choices, Shared, Template, make_template, with_factors
 
 GROUND = -1
 """Node number of the reference."""
@@ -234,17 +234,19 @@ def build_graph(netlist: Netlist) -> CircuitGraph:
         for port, node in zip(placed.part.ports, placed.nodes, strict=False):
             if port.domain is not None:
                 table.node(node, port.domain)
+    by_default: Choices = None if netlist.free_modes else ()
     parameters: dict[str, float] = {}
     zeros: list[str] = []
     parts: list[GraphPart] = []
     branches: list[GraphBranch] = []
     for item in netlist.placed:
         part, (values, _) = item.part, resolve(item.part)
-        template, read = table.templates.of(part, values, item.choices)
+        template, read = table.templates.of(part, values, item.choices or by_default)
         places: dict[str, int] = {}
+        first_numbers = {element.symbol: element.options[0].value for element in template.modes}
         for name in template.parameters:
             places[name] = len(parameters)
-            parameters[f"{part.name}.{name}"] = values.get(name, 0.0)  # numbers of modes are no values of the part
+            parameters[f"{part.name}.{name}"] = values[name] if name in values else first_numbers[name]
         zeros.extend(f"{part.name}.{name}" for name, value in values.items() if isinstance(value, float) and not value)
         nodes = _port_nodes(item, table)
         first = len(branches)

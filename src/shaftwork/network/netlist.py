@@ -67,12 +67,14 @@ class Netlist:
         placed: its components.
         ports: the nodes at which it is joined to other networks.
         impacts: "in turn": what touches is hit after what hits it, as in a row of balls; "together": in one instant.
+        free_modes: whether the numbers of first modes are parameters, so that equations hold in modes of equal form.
     """
 
     name: str
     placed: tuple[Placed, ...]
     ports: tuple[str, ...] = ()
     impacts: Impacts = IMPACTS[0]
+    free_modes: bool = False
 
     def within(self, name: str, nodes: tuple[str, ...]) -> tuple[Placed, ...]:
         """The parts as those of another network, named "name.part".

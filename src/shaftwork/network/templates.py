@@ -45,6 +45,8 @@ from shaftwork.core.errors import ShaftworkError
 from shaftwork.network.kinds import CHANGE, Kind, Resolved, beyond_constant, changes, law_of, resolved, spring
 
 T = TypeVar("T")
+Choices = tuple[ModeChoice, ...] | None
+"""Of the elements of a part with modes; () for the first modes, None for their forms with numbers as parameters."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,13 +133,13 @@ def substitution(part: Component) -> dict[Any, Any]:
     return names
 
 
-def make_template(part: Component, values: Mapping[str, Any], choices: tuple[ModeChoice, ...] = ()) -> Template:
+def make_template(part: Component, values: Mapping[str, Any], choices: Choices = ()) -> Template:
     """The branches of a part whose parameter values are floats or, for laws, expressions.
 
     Args:
         part: the part.
         values: of its parameters.
-        choices: what is chosen for each of its elements that have modes; by default the first modes.
+        choices: what is chosen for its modes.
     """
     translate = substitution(part)
     placed: dict[str, Any] = {}
@@ -160,11 +162,12 @@ def make_template(part: Component, values: Mapping[str, Any], choices: tuple[Mod
     return Template(branches, tuple(symbols.values()), _occurring(derived, itertools.chain(*resolver.read)), modes)
 
 
-def _choose(p: Any, modes: tuple[Modes, ...], choices: tuple[ModeChoice, ...]) -> dict[Symbol, str]:
+def _choose(p: Any, modes: tuple[Modes, ...], choices: Choices) -> dict[Symbol, str]:
     """Put the chosen forms and numbers of modes into `p`; symbol and name of the numbers that stay parameters."""
-    firsts = tuple(ModeChoice(element.options[0].form, element.options[0].value) for element in modes)
+    firsts = (element.options[0] for element in modes)
+    by_default = tuple(ModeChoice(mode.form, None if choices is None else mode.value) for mode in firsts)
     free: dict[Symbol, str] = {}
-    for element, choice in zip(modes, choices or firsts, strict=True):
+    for element, choice in zip(modes, choices or by_default, strict=True):
         setattr(p, element.form, choice.form)
         if choice.value is not None:
             setattr(p, element.symbol, Float(choice.value) if choice.value % 1 else Integer(int(choice.value)))
@@ -343,7 +346,7 @@ class _Resolver:
         return self.read[laws]
 
 
-Work = Callable[[Component, Mapping[str, Any], tuple[ModeChoice, ...]], T]
+Work = Callable[[Component, Mapping[str, Any], Choices], T]
 
 
 class Shared(Generic[T]):
@@ -360,9 +363,7 @@ class Shared(Generic[T]):
         self._work = work
         self._results: dict[Any, list[tuple[Mapping[str, Any], T]]] = {}
 
-    def of(
-        self, part: Component, values: Mapping[str, Any], choices: tuple[ModeChoice, ...] = ()
-    ) -> tuple[T, Mapping[str, Any]]:
+    def of(self, part: Component, values: Mapping[str, Any], choices: Choices = ()) -> tuple[T, Mapping[str, Any]]:
         """The result for a part, and what was read of such a part besides; arguments as of `work`."""
         pattern = tuple((float, bool(value)) if isinstance(value, float) else value for value in values.values())
         results = self._results.setdefault((type(part), pattern, choices), [])

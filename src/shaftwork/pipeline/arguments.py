@@ -15,7 +15,7 @@ from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si, numbers_in_si, whole
 from shaftwork.formulation.form import StateForm
-from shaftwork.integrate.engines import ENGINES
+from shaftwork.integrate.engines import ENGINE_NAMES
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.netlist import Netlist, by_part
 from shaftwork.results.extremes import MOST_OUTPUTS
@@ -27,8 +27,6 @@ OUTPUTS = 1001
 """Output times where the user gives none."""
 NOMINAL = 1e-3
 """Absolute tolerance as a fraction of the relative one, for a speed of 1 rad/s (m/s, V)."""
-STUDIED = ("auto", *ENGINES, "wave")
-"""What an engine may be called in a study."""
 OutputTimes = int | Sequence[float] | Array | Literal["steps"] | None
 Given = Mapping[str, float] | None
 """Values by name."""
@@ -189,7 +187,7 @@ def output_times(t_eval: OutputTimes, start: float, end: float) -> Array | None:
         return np.linspace(start, end, count)
     plain = numbers_in_si("t_eval", t_eval, "s")
     try:
-        times = np.asarray(plain, dtype=float)
+        times = np.array(plain, dtype=float)  # that of the caller may change
     except (TypeError, ValueError):
         raise ParameterError(f"t_eval = {t_eval!r} must be a list of times, their number, or 'steps'.") from None
     good = times.ndim == 1 and times.size > 0 and bool(np.isfinite(times).all())
@@ -310,6 +308,6 @@ def engine_names(engines: Iterable[str]) -> tuple[str, ...]:
         ParameterError: there is no such engine.
     """
     names = several("engines", engines)
-    if unknown := [name for name in names if name not in STUDIED]:
-        raise ParameterError(f"There is no engine {unknown[0]!r}. Take some of: {', '.join(STUDIED)}.")
+    if unknown := [name for name in names if name not in ENGINE_NAMES]:
+        raise ParameterError(f"There is no engine {unknown[0]!r}. Take some of: {', '.join(ENGINE_NAMES)}.")
     return names

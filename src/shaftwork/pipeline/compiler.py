@@ -3,23 +3,44 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from shaftwork.core.errors import NetworkError, NetworkWarning
+from shaftwork.core.errors import Diagnostic, NetworkError, NetworkWarning
 from shaftwork.core.notices import warn
 from shaftwork.formulation.diagnosis import diagnose
 from shaftwork.formulation.form import StateForm
+from shaftwork.network.checks import SEPARATE, resting_trains
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.angles import with_angles
 from shaftwork.pipeline.model import Model
 
 
-def sound(netlist: Netlist, accepted: str = "") -> StateForm:
-    """The state form of a network without errors but for an accepted kind; warnings are issued."""
-    _, form, problems = diagnose(netlist)
-    if errors := tuple(problem for problem in problems if problem.severity == "error" and problem.kind != accepted):
+def sound(netlist: Netlist) -> StateForm:
+    """The state form of a network without errors, its parts in their first modes; warnings are issued."""
+    return _sound(netlist, *diagnose(netlist)[1:])
+
+
+def diagnose_motion(netlist: Netlist) -> tuple[StateForm | None, tuple[Diagnostic, ...]]:
+    """The state form in which the numbers of modes are parameters, and every problem; nothing is raised.
+
+    What a part lacks in its first mode, a node that a gap alone holds for one, is said of that.
+    """
+    _, form, problems = diagnose(replace(netlist, free_modes=True))
+    if form is not None and _has_modes(form, netlist) and _errors(problems):
+        in_first_modes = diagnose(netlist)[2]
+        problems = in_first_modes if _errors(in_first_modes) else problems
+    return form, problems
+
+
+def _errors(problems: Iterable[Diagnostic], accepted: str = "") -> tuple[Diagnostic, ...]:
+    return tuple(problem for problem in problems if problem.severity == "error" and problem.kind != accepted)
+
+
+def _sound(netlist: Netlist, form: StateForm | None, problems: tuple[Diagnostic, ...], accepted: str = "") -> StateForm:
+    """The state form, where nothing is wrong but for an accepted kind; warnings are issued."""
+    if errors := _errors(problems, accepted):
         raise NetworkError(f"'{netlist.name}' cannot be assembled", errors)
     for problem in problems:
         if problem.severity == "warning":
@@ -47,15 +68,22 @@ class Compiler:
             NetworkError: it cannot be assembled.
         """
         with _without_collection():
-            form = sound(netlist, self.accepted)
+            diagnosed, problems = diagnose_motion(netlist)
+            form = _sound(netlist, diagnosed, problems, self.accepted)
             if self.angles:
                 form = with_angles(form.graph, self.angles)
-            return _kind_of_model(form, netlist)(form, netlist, self)
+            apart = any(problem.kind == SEPARATE for problem in problems)
+            return _kind_of_model(form, netlist)(form, netlist, self, resting_trains(form.graph) if apart else ())
+
+
+def _has_modes(form: StateForm, netlist: Netlist) -> bool:
+    """Whether parts of a network change their mode, and none is chosen."""
+    return any(part.modes for part in form.graph.parts) and not any(item.choices for item in netlist.placed)
 
 
 def _kind_of_model(form: StateForm, netlist: Netlist) -> type[Model]:
     """The kind of model that a network needs; that of one phase, in which modes are chosen, has no phases."""
-    if any(part.modes for part in form.graph.parts) and not any(item.choices for item in netlist.placed):
+    if _has_modes(form, netlist):
         if form.waves:
             from shaftwork.waves.hybrid_wave_model import HybridWaveModel
 

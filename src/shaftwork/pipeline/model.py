@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -22,9 +21,8 @@ from shaftwork.core.notices import PulsationWarning, muted
 from shaftwork.core.parameters import in_si
 from shaftwork.formulation.form import StateForm
 from shaftwork.integrate import choice
-from shaftwork.integrate.engines import EngineName, available
+from shaftwork.integrate.engines import EngineName
 from shaftwork.integrate.problem import Problem, Trajectory
-from shaftwork.network.checks import resting_trains
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import (
     Demand,
@@ -46,7 +44,6 @@ from shaftwork.pipeline.implicit import IMPLICIT, PRESCRIBED, solve_loops, start
 from shaftwork.pipeline.motion_start import (
     Ending,
     Repetition,
-    call_of,
     ending_of,
     model_again,
     refuse_motion,
@@ -73,14 +70,21 @@ class Model(CompiledModel):
         form: the state form.
         netlist: what it was made of.
         rebuild: makes the model of a changed netlist; used where a new parameter value changes the structure.
+        resting: trains that nothing joins to the drive.
     """
 
     phased: ClassVar[bool] = False
     """Whether parts change their mode, so that each phase has equations of its own."""
 
-    def __init__(self, form: StateForm, netlist: Netlist, rebuild: Callable[[Netlist], Model]) -> None:
+    def __init__(
+        self,
+        form: StateForm,
+        netlist: Netlist,
+        rebuild: Callable[[Netlist], Model],
+        resting: tuple[Diagnostic, ...] = (),
+    ) -> None:
         super().__init__(form)
-        self.netlist, self._rebuild = netlist, rebuild
+        self.netlist, self._rebuild, self._resting = netlist, rebuild, resting
         self._prepared = BoundedCache[bytes, Prepared](1)
         self._variants = BoundedCache[tuple[tuple[str, float], ...], Model](VARIANTS)
         self._choices: list[tuple[tuple[float, float, float], Array, tuple[str, str]]] = []
@@ -140,27 +144,31 @@ class Model(CompiledModel):
         """
         refuse_unrecorded(self.form, as_names(angles))
         values = self._checked_all(parameters)
-        if isinstance(initial, Solution):
-            initial = ending_of(initial, self.form.graph)
-        t_start = time_of_start(t_start, initial)
+        initial, t_start = self._start(initial, t_start)
         if self._changes_structure(values):
             options: dict[str, Any] = {"t_start": t_start, "rtol": rtol, "atol": atol, "t_eval": t_eval}
             options |= {"engine": engine, "initial": initial, "max_steps": max_steps, "progress": progress}
             return self._variant(values).simulate(t_end, **options)
-        told, span = Callback(progress), time_span(t_start, t_end)
+        told, span = Callback(progress), time_span(0.0 if t_start is None else t_start, t_end)
         wanted = relative_tolerance(rtol), atol, output_times(t_eval, *span), engine, step_limit(max_steps)
         demand = Demand(span, *wanted, told if progress else None)
-        if initial is None or (isinstance(initial, Mapping) and not isinstance(initial, Ending)):
+        if self._resting and not isinstance(initial, Ending):
             warn_of_rest(self.name, self._resting, initial or {})
         motion = with_accuracy(told.of(lambda: self._motion(values, initial, demand)), demand)
-        parameters = dict(zip(self.parameters, self.defaults.tolist(), strict=True)) | values
-        again = Repetition(self._rebuild, self.netlist, call_of(motion, demand, values, initial), self)
+        parameters = {**self.parameters, **values}
+        taken = demand.engine if motion.phases else motion.engine
+        again = Repetition(self._rebuild, self.netlist, demand, taken, values, initial, self)
         return replace(motion, parameters=parameters, initial=dict(initial or {}), rtol=demand.rtol, again=again)
 
-    @cached_property
-    def _resting(self) -> tuple[Diagnostic, ...]:
-        """Trains that nothing joins to the drive."""
-        return resting_trains(self.form.graph)
+    def _start(
+        self, initial: Mapping[str, float] | Solution | None, t_start: float | None
+    ) -> tuple[Given, float | None]:
+        """Start values or the end of the motion before, and the time of it."""
+        if isinstance(initial, Solution):
+            initial = ending_of(initial, self.form.graph)
+        if isinstance(initial, Ending):
+            return initial, time_of_start(t_start, initial)
+        return (dict(initial) if isinstance(initial, Mapping) else initial), t_start  # that of the caller may change
 
     def _motion(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
         prepared = self.prepare(self.vector(values) if values else self.defaults)
@@ -326,7 +334,7 @@ class Model(CompiledModel):
         if engine != "auto":
             return engine, "asked for"
         if self.form.loop_laws:
-            return "sundials" if available("sundials") else "scipy-radau", IMPLICIT
+            return choice.implicit(), IMPLICIT
         key = (problem.t0, problem.t_end, problem.rtol)
         for run, p, chosen in self._choices:
             # Parameters that differ by less than a factor of 5 suit the same engine: looking anew would cost more than

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 from weakref import WeakValueDictionary
 
@@ -177,48 +177,47 @@ def model_again(rebuild: Rebuild, netlist: Netlist) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Repetition:
-    """The call that has led to a motion.
+    """The call that has led to a motion; it leads there again by the engine that was taken.
+
+    A motion through phases has an engine for each, which is chosen anew.
 
     Args:
         rebuild: makes the model again.
         netlist: of which it is a motion.
-        options: of `Model.simulate`.
+        demand: what was asked.
+        engine: the one to take.
+        values: parameters that differ from the network's.
+        initial: start values.
         model: the model itself, where it is at hand.
     """
 
     rebuild: Rebuild
     netlist: Netlist
-    options: Mapping[str, Any]
+    demand: Demand
+    engine: str
+    values: Mapping[str, float]
+    initial: Mapping[str, float] | None
     model: Any = None
 
     def __call__(self) -> Solution:
         """The motion, made again."""
-        model = self.model or model_again(self.rebuild, self.netlist)
+        model, demand = self.model or model_again(self.rebuild, self.netlist), self.demand
         with muted(NetworkWarning, AccuracyWarning):  # its author has seen them
-            motion: Solution = model.simulate(**self.options)
+            motion: Solution = model.simulate(
+                demand.span[1],
+                t_start=demand.span[0],
+                rtol=demand.rtol,
+                atol=demand.atol,
+                t_eval="steps" if demand.t_eval is None else demand.t_eval,
+                engine=self.engine,
+                initial=self.initial,
+                parameters=self.values,
+                max_steps=demand.max_steps,
+            )
             return motion
 
     def __reduce__(self) -> tuple[Any, ...]:
         if self.model is not None:
             remember(self.model, self.rebuild)
-        return Repetition, (self.rebuild, self.netlist, self.options)
-
-
-def call_of(
-    motion: Solution, demand: Demand, values: Mapping[str, float], initial: Mapping[str, Any] | None
-) -> dict[str, Any]:
-    """The arguments of `Model.simulate` that lead to a motion again, by the engine that was taken.
-
-    A motion through phases has an engine for each, which is chosen anew.
-    """
-    return {
-        "t_start": demand.span[0],
-        "t_end": demand.span[1],
-        "rtol": demand.rtol,
-        "atol": demand.atol,
-        "t_eval": "steps" if demand.t_eval is None else demand.t_eval.copy(),
-        "engine": demand.engine if motion.phases else motion.engine,
-        "max_steps": demand.max_steps,
-        "parameters": dict(values),
-        "initial": initial if initial is None or isinstance(initial, Ending) else dict(initial),
-    }
+        demand = replace(self.demand, progress=None)
+        return Repetition, (self.rebuild, self.netlist, demand, self.engine, self.values, self.initial)

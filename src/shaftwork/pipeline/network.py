@@ -11,11 +11,10 @@ from shaftwork.core.errors import Diagnostic, NetworkWarning, ParameterError, Sh
 from shaftwork.core.notices import muted
 from shaftwork.equations.kirchhoff import kirchhoff
 from shaftwork.equations.records import Equations, NamedPhase
-from shaftwork.formulation.diagnosis import diagnose
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.netlist import Netlist, NetworkBuilder
 from shaftwork.pipeline.arguments import Point, Time, as_names
-from shaftwork.pipeline.compiler import Compiler, sound
+from shaftwork.pipeline.compiler import Compiler, diagnose_motion, sound
 from shaftwork.pipeline.model import Model
 from shaftwork.results.solution import Solution
 
@@ -52,7 +51,7 @@ class Network(NetworkBuilder):
 
     def check(self) -> tuple[Diagnostic, ...]:
         """Everything that is wrong with the network or worth saying about it. Never raises."""
-        return diagnose(self.netlist())[2]
+        return diagnose_motion(self.netlist())[1]
 
     def graph(self) -> CircuitGraph:
         """The circuit graph: nodes, parts and an ordered table of branches; `.multigraph` is it for networkx.

@@ -21,7 +21,7 @@ from shaftwork.codegen.undefined_laws import rough, without_value
 from shaftwork.core.errors import AccuracyWarning
 from shaftwork.core.notices import warn
 from shaftwork.formulation.form import StateForm
-from shaftwork.integrate.engines import ENGINES, WAVE, too_fine
+from shaftwork.integrate.engines import ENGINES, too_fine
 from shaftwork.integrate.problem import Fractions, LinearInputs, Observed, Problem
 from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind
@@ -251,13 +251,14 @@ def in_its_size(form: StateForm, prepared: Prepared, demand: Demand, run: Callab
 
 def _hidden(motion: Solution, form: StateForm, demand: Demand, tolerances: Array) -> Sizes | None:
     """The sizes of a motion of which the tolerances have hidden something; None where they have not."""
-    if not ENGINES.get(motion.engine, WAVE).absolute or not motion.states:
+    entry = ENGINES[motion.engine]
+    if entry.absolute == "none" or not motion.states:
         return None
     largest, rtol = _largest(motion), demand.rtol
     overall = max(largest.values())
-    if motion.engine == "heyoka":
+    if entry.absolute == "overall":
         # its one tolerance is absolute while all states are below one
-        absolute = min(rtol, ENGINES["heyoka"].loosest) * demand.sizes.overall
+        absolute = min(rtol, entry.loosest) * demand.sizes.overall
         return (
             Sizes(overall=10.0 ** math.floor(math.log10(overall))) if absolute > HIDDEN * rtol * overall > 0 else None
         )
@@ -276,7 +277,8 @@ def _hidden(motion: Solution, form: StateForm, demand: Demand, tolerances: Array
 
 def _largest(motion: Solution) -> dict[str, float]:
     """The largest absolute value of all that is stored."""
-    enough = len(motion.t) >= 64 or motion.engine == "heyoka"  # to look at its steps costs a run
+    # For an engine with one size of all states, the steps are not worth another run.
+    enough = ENGINES[motion.engine].absolute == "overall" or len(motion.t) >= 64
     x = motion.x if enough else motion.dense(motion.steps)
     return dict(zip(motion.states, np.abs(x[:, : len(motion.states)]).max(axis=0).tolist(), strict=True))
 

@@ -295,7 +295,7 @@ def _at_edges(model: CompiledModel, span: tuple[float, float]) -> Iterator[str]:
     switching, p = model.switching, model.defaults
     instants = switching.timeline(p, *span)
     after, before = instants.sides(span[0])[1], instants.sides(span[1])[0]
-    values = dict(zip((Symbol(name, real=True) for name in model.parameters), p.tolist(), strict=True))
+    values = dict(zip((Symbol(name, real=True) for name in model.form.graph.parameters), p.tolist(), strict=True))
     for time, aside in ((span[0], after - span[0]), (span[1], span[1] - before)):
         for argument in switching.passed(p, time - aside, time + aside, modes=True) if aside else ():
             here = {**values, TIME: time}

@@ -17,7 +17,7 @@ from shaftwork.components.shaft_models import ShaftModel, Wave
 from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError, in_one_line
 from shaftwork.core.files import write_rows
 from shaftwork.core.screen import in_columns
-from shaftwork.integrate.engines import ENGINES, available
+from shaftwork.integrate.engines import ENGINE_NAMES, available
 from shaftwork.pipeline.arguments import NOMINAL, engine_names, several
 from shaftwork.pipeline.model import Model
 from shaftwork.results.observer import Array
@@ -155,7 +155,7 @@ def stability(
     Raises:
         ParameterError: there is no such case, model or engine.
     """
-    names = engine_names(engines) or ("auto", *(name for name in ENGINES if available(name)), "wave")
+    names = engine_names(engines) or tuple(name for name in ENGINE_NAMES if name == "auto" or available(name))
     read = shaft_models(models)
     cells: list[Cell] = []
     for case in [_named(case) if isinstance(case, str) else case for case in several("cases", cases)]:

@@ -18,7 +18,7 @@ from shaftwork.waves.wave_motion import engine_of_waves
 class WaveEquationSets(EquationSets):
     """All sets of equations of a network with waves whose parts change their mode."""
 
-    kind = WaveModeEquations
+    kind, model_kind = WaveModeEquations, WaveModel
 
     def engine(
         self,

@@ -199,7 +199,7 @@ class Inputs:
         templates = (group.branches.template for group in self._groups)
         return all(is_linear(one.law, (ACROSS, INTEGRAL, *one.reads)) for one in templates)
 
-    @property
+    @cached_property
     def switching(self) -> bool:
         """Whether a law jumps or bends because of the motion."""
         return any(group.moving for group in self._groups)

@@ -85,7 +85,7 @@ class MatrixAssembly:
         self.outputs = np.array(outputs, dtype=np.intp)
         self.coefficients = Coefficients(form.graph)
         self.loops = link_matrix(form, form.tree.loops)
-        self.cutsets = self.loops if form.tree.cutsets is form.tree.loops else link_matrix(form, form.tree.cutsets)
+        self.cutsets = link_matrix(form, form.tree.cutsets) if form.loses_power else self.loops
         self.inputs = np.array([*form.laws, *form.across_inputs], dtype=np.intp)
 
     @cached_property

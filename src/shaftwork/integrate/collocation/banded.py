@@ -20,13 +20,15 @@ from shaftwork.integrate.collocation.banded_stages import (
     shifted_collocation,
 )
 from shaftwork.integrate.engines import ENGINES
+from shaftwork.integrate.linear.propagation import cost
 from shaftwork.integrate.problem import Array, Problem, Trajectory
-from shaftwork.integrate.smooth_intervals import SmoothInterval, check_finite, failure, pieces
+from shaftwork.integrate.smooth_intervals import SmoothInterval, check_finite, failure
 from shaftwork.integrate.stepping import Step, SteppedRun, march
-from shaftwork.numerics.tolerances import SAME
+from shaftwork.integrate.stiffness import STABLE, first_jacobian, is_chain, is_undamped, jacobians, rates
 
-# A step is chosen so much shorter than the error of the last one would let it be.
-SAFETY = 0.9
+# `auto` takes the engine for damped chains that are not linear where an explicit method needs more steps than these: it
+# takes some hundred steps, even on chains of 10000 elements, each as long as some explicit ones.
+FEWEST_STEPS = 1e4
 
 
 def solve(problem: Problem) -> Trajectory:
@@ -44,8 +46,7 @@ def solve(problem: Problem) -> Trajectory:
     Source: Hairer and Wanner, Solving Ordinary Differential Equations II, 1996, chapter IV.
     """
     stepper = _BandedStepper(problem)
-    with np.errstate(all="ignore"):
-        whole = march(problem, stepper)
+    whole = march(problem, stepper)
     taken = sum(len(piece.times) - 1 for piece in whole.pieces)
     statistics = {"steps": taken, "rejected": stepper.tried - taken, **stepper.stages.counts}
     dense = _BandedDense(whole, stepper)
@@ -54,23 +55,24 @@ def solve(problem: Problem) -> Trajectory:
     return Trajectory(np.asarray(problem.t_eval, dtype=float), stepper.outputs.x, dense, statistics)
 
 
-def is_chain(problem: Problem) -> bool:
-    """Whether each state is joined to few others, as in chains and trees, so that factors of matrices stay sparse."""
-    if problem.straight is None and problem.jacobian is None:
-        return False
-    matrix = _matrix(problem)
-    # damped springs in a chain give four entries a state at most; matrices of more than eight may fill up
-    return bool(matrix.nnz <= 8 * matrix.shape[0])
-
-
-def is_undamped(problem: Problem) -> bool:
-    """Whether all motions of a passive system keep their energy, by its Jacobian at the start.
-
-    The real parts of its eigenvalues are then zero. None of them is positive where nothing drives, so it is enough that
-    their sum, the trace, is zero.
-    """
-    diagonal = _matrix(problem).diagonal()
-    return bool(abs(diagonal.sum()) <= SAME * np.abs(diagonal).sum())
+def suits(problem: Problem) -> str:
+    """Why `auto` takes this engine for a chain that the exact one leaves to others; empty where it does not."""
+    if problem.straight is not None:
+        if not is_chain(problem):
+            return ""
+        seconds = cost(problem, problem.straight)
+        return f"The system is a long linear chain: exact propagation would take about {seconds:.2g} s."
+    small = problem.x0.size <= ENGINES["banded"].asked_beyond
+    if small or not is_chain(problem) or is_undamped(problem):
+        return ""
+    fastest = rates(jacobians(problem))
+    explicit_steps = max(fastest.decay, fastest.oscillation) * (problem.t_end - problem.t0) / STABLE
+    if explicit_steps <= FEWEST_STEPS:
+        return ""
+    return (
+        f"The system is a long damped chain: an explicit method would need about {explicit_steps:.2g} steps, "
+        "and the equations of an implicit one are banded."
+    )
 
 
 class _Arc:
@@ -134,15 +136,23 @@ class _Outputs:
 
 
 class _BandedStepper:
-    """The method, and what dense output needs of its steps."""
+    """The method, and what dense output needs of its steps.
+
+    Args:
+        problem: what is being solved.
+        safety: a step is so much shorter than the error of the last one would let it be.
+    """
 
     engine = "banded"
     cuts_off = False
 
-    def __init__(self, problem: Problem) -> None:
-        self.problem, self._rtol = problem, max(problem.rtol, ENGINES["banded"].finest)
+    def __init__(self, problem: Problem, safety: float = 0.9) -> None:
+        matrix = first_jacobian(problem)
+        if matrix is None:
+            raise ParameterError("The banded engine needs a Jacobian, and this problem has none. Take 'scipy-radau'.")
+        self.problem, self._safety = problem, safety
         self.method = _method(problem)
-        self.stages = BandedStages(problem, _matrix(problem), self.method)
+        self.stages = BandedStages(problem, matrix, self.method)
         self.outputs = _Outputs(problem)
         self.pieces: list[SmoothInterval] = []
         self.taken: list[list[tuple[float, Array | None]]] = []
@@ -153,7 +163,7 @@ class _BandedStepper:
 
     def scale(self, x: Array) -> Array:
         """The tolerance (n,) of each state."""
-        return np.maximum(self.problem.atol + self._rtol * np.abs(x), np.finfo(float).tiny)
+        return np.maximum(self.problem.atol + self.problem.rtol * np.abs(x), np.finfo(float).tiny)
 
     def open(self, piece: SmoothInterval, t: float, x: Array) -> Array:
         if t == piece.start:
@@ -179,7 +189,7 @@ class _BandedStepper:
         length, end = _fitted(t, self._step, piece.end)
         arc = self.arc(start, length)
         factor = 0.25 if arc is None else self._factor(arc, np.maximum(start.scale, self.scale(arc.end)))
-        if arc is None or factor < SAFETY:
+        if arc is None or factor < self._safety:
             self._step = factor * length
             return None
         check_finite(self.problem, "banded", end, arc.end)
@@ -211,11 +221,11 @@ class _BandedStepper:
         return None if modes is None else _Arc(self.stages, self.method, start, length, modes)
 
     def _factor(self, arc: _Arc, scale: Array) -> float:
-        """The factor by which the next step may be longer; below `SAFETY` this one was too long."""
+        """The factor by which the next step may be longer; below the safety this one was too long."""
         error, least, most = self.method.peak * float((np.abs(arc.defect) / scale).max()), 0.1, 8.0
         if not np.isfinite(error):
             return least
-        return float(np.clip(SAFETY * max(error, 1e-300) ** (-1 / (self.method.order + 1)), least, most))
+        return float(np.clip(self._safety * max(error, 1e-300) ** (-1 / (self.method.order + 1)), least, most))
 
 
 class _BandedDense:
@@ -257,15 +267,6 @@ def _method(problem: Problem) -> ShiftedCollocation:
     """The method that suits a problem."""
     undamped = problem.straight is not None and is_undamped(problem)
     return shifted_collocation("gauss" if undamped else "radau", 6)
-
-
-def _matrix(problem: Problem) -> Any:
-    """The Jacobian (n, n) at the start."""
-    if problem.straight is not None:
-        return problem.straight.A
-    if problem.jacobian is None:
-        raise ParameterError("The banded engine needs a Jacobian, and this problem has none. Take 'scipy-radau'.")
-    return problem.jacobian(pieces(problem)[0].inside(problem.t0), problem.x0)
 
 
 def _fitted(t: float, step: float, end: float) -> tuple[float, float]:

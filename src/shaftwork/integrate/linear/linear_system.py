@@ -28,8 +28,8 @@ from shaftwork.numerics.tolerances import SAME
 
 Complex = NDArray[np.complex128]
 
-# Degree of a panel's polynomials, the part of an input that they may leave out, and that which rounding may take.
-DEGREE, LEFT_OUT, ROUNDED = 8, 1e-13, 1e-10
+# Degree of a panel's polynomials.
+DEGREE = 8
 _NODES = (1 + chebyshev_nodes(DEGREE)) / 2
 # Values at the nodes of [0, 1] to the coefficients of the powers.
 _POWERS = to_powers(_NODES)
@@ -206,10 +206,18 @@ def _moved(rates: Complex, length: float, inside: Array, start: Complex, inputs:
     return np.asarray(motion)
 
 
-def polynomials(forcing: Callable[[Array], Array], length: float, fewest: int, most: int) -> Array | None:
+def polynomials(
+    forcing: Callable[[Array], Array],
+    length: float,
+    fewest: int,
+    most: int,
+    *,
+    left_out: float = 1e-13,
+    rounded: float = 1e-10,
+) -> Array | None:
     """Values (n, panels, degree + 1) of inputs at the nodes of panels that resolve them, or None where none do.
 
-    Law: panels are halved until the last Chebyshev coefficients of all inputs are below `LEFT_OUT` of the largest
+    Law: panels are halved until the last Chebyshev coefficients of all inputs are below `left_out` of the largest
     value, or do not fall any more because they are the rounding of the time in the input.
 
     Args:
@@ -217,6 +225,8 @@ def polynomials(forcing: Callable[[Array], Array], length: float, fewest: int, m
         length: of the span, s.
         fewest: panels, at least.
         most: values, at most.
+        left_out: part of an input that the polynomials may leave out.
+        rounded: the part that rounding may take.
     """
     panels, before, each = fewest, np.inf, (DEGREE + 1) * len(forcing(np.zeros(1)))
     while panels * each <= most:
@@ -227,7 +237,7 @@ def polynomials(forcing: Callable[[Array], Array], length: float, fewest: int, m
             return None
         last = np.abs(values @ _CHEBYSHEV.T)[..., -2:].max(axis=(1, 2))
         rough = float((last / largest).max(initial=0.0))
-        if rough <= LEFT_OUT or before / 4 < rough <= ROUNDED:
+        if rough <= left_out or before / 4 < rough <= rounded:
             return values
         panels, before = 2 * panels, rough
     return None

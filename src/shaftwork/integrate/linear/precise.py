@@ -21,14 +21,7 @@ from shaftwork.integrate.smooth_intervals import PiecewiseDense, SmoothInterval,
 from shaftwork.integrate.stiffness import balance, scale_by
 from shaftwork.numerics.polynomials import Interpolant, chebyshev_nodes, interpolation_times, to_chebyshev
 
-# Between outputs the motion is polynomials of this degree, which leave out this part of the largest value of a state.
-DEGREE, LEFT_OUT = 20, 2e-14
-# A motion that rings in more panels than these goes on in floats from exact nodes.
-MOST_PANELS = 200
 Nearby = Callable[[Array, Array, Array], Array]
-_COEFFICIENTS = to_chebyshev(chebyshev_nodes(DEGREE))
-# The exponential of a matrix of this norm has a series of few terms; those of longer times are its squares.
-UNIT = 2.0**-24
 Integers = Any
 """An array of Python's whole numbers."""
 
@@ -46,8 +39,11 @@ class FixedPoint:
     def __init__(self, matrix: Any, length: float) -> None:
         self._matrix = matrix
         norm = max((math.fsum(abs(float(entry)) for entry in row if entry) for row in matrix), default=0.0)
-        unit = UNIT / norm if norm > 0 else length
+        # A matrix of the norm 2^-24 has an exponential of few terms; those of longer times are its squares.
+        halvings = 24
+        unit = 2.0**-halvings / norm if norm > 0 else length
         self._unit = Fraction(2) ** math.floor(math.log2(min(unit, length)))
+        self._short = self._unit * (1 << halvings)
         self.squares = math.ceil(math.log2(length / float(self._unit))) + 1
         self.bits = 192 + 2 * self.squares  # the squares lose two digits each
         self._powers: list[Integers] = []
@@ -82,7 +78,7 @@ class FixedPoint:
 
     def is_short(self, time: Fraction) -> bool:
         """Whether the norm of M t is at most 1."""
-        return time <= self._unit / Fraction(UNIT)
+        return time <= self._short
 
     def nudge(self, block: Integers, times: Sequence[Fraction]) -> Integers:
         """The columns (m, k) of a block, each moved by its own short time in s, forward or back, by a Taylor series."""
@@ -202,18 +198,21 @@ class PrecisePiece:
 
         The last panel comes first: what still moves fast there does so all the time.
         """
+        degree, left_out = 20, 2e-14  # of a polynomial, and the part of the largest value of a state that it may lack
+        most = 200  # of panels; a motion that rings in more of them goes on in floats from exact nodes
+        coefficients = to_chebyshev(chebyshev_nodes(degree))
         starts, panels = [self.piece.start], list[Interpolant]()
         end, largest = self.piece.end, np.zeros(len(self.system.scale) - 2 * len(self.system.active))
         while starts:
             start = starts[-1]
             shares = (self.piece.end - self.piece.start) / (end - start)
-            if len(panels) > MOST_PANELS or (not panels and shares > MOST_PANELS):
+            if len(panels) > most or (not panels and shares > most):
                 return None
-            states = self.exactly(interpolation_times(start, end, DEGREE))
+            states = self.exactly(interpolation_times(start, end, degree))
             largest = np.maximum(largest, np.abs(states).max(axis=0))
-            missing = np.abs(_COEFFICIENTS @ states)[-2:].max(axis=0)
+            missing = np.abs(coefficients @ states)[-2:].max(axis=0)
             middle = (start + end) / 2
-            if (missing > LEFT_OUT * largest).any() and start < middle < end:
+            if (missing > left_out * largest).any() and start < middle < end:
                 starts.append(middle)
                 continue
             panels.append(Interpolant(start, end, states))

@@ -32,14 +32,29 @@ from shaftwork.integrate.linear.precise import (
 from shaftwork.integrate.linear.rounding_errors import WORTH_SAYING, difference, doubt
 from shaftwork.integrate.problem import Array, LinearInputs, Problem, Trajectory
 from shaftwork.integrate.smooth_intervals import SmoothInterval, both_sides, failure, pieces, piecewise, start_of_piece
-from shaftwork.integrate.stiffness import LARGEST_EIGENVALUES
+from shaftwork.integrate.stiffness import LARGEST_EIGENVALUES, is_chain, is_undamped
 
-# Measured on one core: a dense product does about this many multiplications a second, a sparse product takes this long.
-DENSE_RATE, SPARSE_CALL, SPARSE_RATE = 1e10, 1e-5, 5e8
 # States up to which inputs that are no straight lines are followed mode by mode.
 LARGEST_DRIVEN = 600
-# An exact run is made up to this estimate of its time in s, and one in whole numbers, where rounding spoils it, too.
+# `auto` takes the engine up to this estimate of its time in s, and where rounding spoils a run, one in whole numbers is
+# made up to it.
 LONGEST_EXACT = 10.0
+
+
+def suits(problem: Problem) -> str:
+    """Why `auto` takes this engine for a linear problem; empty where it does not."""
+    if problem.straight is not None:
+        seconds = cost(problem, problem.straight)
+        # of a damped chain the banded engine takes 0.3 s at 1400 states and rtol 1e-8, and this one 4 s
+        longest = LONGEST_EXACT / 10
+        if seconds > longest and not (is_chain(problem) and not is_undamped(problem)):
+            longest = LONGEST_EXACT
+        if seconds > longest:
+            return ""
+        return "The system is linear with inputs of straight pieces, so it is propagated exactly."
+    if drivable(problem):
+        return "The system is linear with smooth inputs, so its modes are propagated without a step error."
+    return ""
 
 
 def solve(problem: Problem) -> Trajectory:
@@ -220,14 +235,16 @@ def cost(problem: Problem, linear: LinearInputs) -> float:
 
 def _dense_cost(problem: Problem) -> float:
     n, intervals = _size(problem)
-    return float(n) ** 3 * 30 * (1 + len(problem.breakpoints)) / DENSE_RATE + intervals * n**2 / DENSE_RATE
+    # a core does some 1e10 multiplications of dense products a second
+    return (30 * float(n) ** 3 * (1 + len(problem.breakpoints)) + intervals * n**2) / 1e10
 
 
 def _sparse_cost(problem: Problem, linear: LinearInputs) -> float:
     system = system_of(linear)
     # of the truncated Taylor series of `expm_multiply`
     products = 6 * system.norm * (problem.t_end - problem.t0) + 20 * _size(problem)[1]
-    return float(products * (SPARSE_CALL + system.matrix.nnz / SPARSE_RATE))
+    # a call takes a core 1e-5 s, and for the entries it does 5e8 multiplications a second
+    return float(products * (1e-5 + system.matrix.nnz / 5e8))
 
 
 def _size(problem: Problem) -> tuple[int, int]:

@@ -17,15 +17,10 @@ from shaftwork.integrate.linear.linear_system import OWN_INTERVALS
 from shaftwork.integrate.problem import Array, Observed, Problem, Trajectory
 from shaftwork.integrate.stiffness import LARGEST_EIGENVALUES, balance, scale_by
 
-# So many states of a run tell what its dampers take; so many outputs are looked at, evenly and ever denser towards its
-# start.
-SAMPLES = 12
 # From this part of the largest value of its kind on rounding is worth saying, and a run in whole numbers worth making.
 # It is an estimate, no bound: with it none of 1771 random networks, parameters from 1e-12 to 1e12, is off by 1e-6
 # without a word.
 WORTH_SAYING = 2e-7
-# A motion each of whose states is known to this part is not looked at any further.
-CERTAIN = 1e-10
 # Where torques may be off by this part because of the rounding of speeds, a run says so. Of a linear network less is
 # said already (`verification`): there every torque is read, and here only the Jacobian tells.
 SPOILED = 1e-4
@@ -85,7 +80,7 @@ class _Part:
 
 def _largest(problem: Problem, times: Array, states: Array, *, springs: bool) -> float:
     """The largest ratio of the parts of a damper's torque to this torque, or to what else acts there."""
-    chosen = np.unique(np.linspace(0, times.size - 1, SAMPLES).astype(int))
+    chosen = np.unique(np.linspace(0, times.size - 1, 12).astype(int))  # so many tell what dampers take
     sums, torques, other = (np.full(problem.x0.size, np.finfo(float).tiny) for _ in range(3))
     slowest = 1 / (problem.t_end - problem.t0)
     parts = _parts(problem, times[chosen], states[chosen])
@@ -140,8 +135,9 @@ def doubt(problem: Problem, trajectory: Trajectory, lost: Array) -> float:
     """
     if problem.observed is None or not trajectory.t.size:
         return 0.0
-    if (lost <= CERTAIN * np.abs(trajectory.x).max(axis=0)).all():
-        return CERTAIN
+    certain = 1e-10  # a motion each of whose states is known to this part is not looked at any further
+    if (lost <= certain * np.abs(trajectory.x).max(axis=0)).all():
+        return certain
     chosen = samples(trajectory.t.size)
     times, states = trajectory.t[chosen], trajectory.x[chosen]
     observed, ends = problem.observed, np.full(1, times[-1])
@@ -160,10 +156,10 @@ def difference(problem: Problem, trajectory: Trajectory, other: Trajectory) -> f
     return largest_part(observed, np.where(observed.direct, np.abs(first - second).max(axis=0), 0.0), first)[0]
 
 
-def samples(count: int) -> Array:
-    """Places of the outputs that are looked at."""
-    evenly = np.linspace(0, count - 1, SAMPLES)
-    early = np.geomspace(1, count, SAMPLES) - 1
+def samples(count: int, each: int = 12) -> Array:
+    """Places of the outputs that are looked at: so many evenly, and as many ever denser towards the start."""
+    evenly = np.linspace(0, count - 1, each)
+    early = np.geomspace(1, count, each) - 1
     return np.unique(np.concatenate([evenly, early]).round().astype(int))
 
 

@@ -12,17 +12,14 @@ import numpy as np
 
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.problem import Array, Problem, SeriesError, StickingError
-from shaftwork.integrate.smooth_intervals import SmoothInterval, failure, start_of_piece, used_up
+from shaftwork.integrate.smooth_intervals import SmoothInterval, failure, near, start_of_piece, used_up
 from shaftwork.integrate.taylor.heyoka_switches import SOMEWHERE, SwitchWatch, keeps_sides, settle
+from shaftwork.numerics.tolerances import SAME
 
 # What heyoka's outcomes are called here where a guard ended the run.
 GUARD = "guard"
-# Where in a step a series is compared with the equations, as parts of the step: not at its end, where a law may jump.
-INSIDE = (0.5, 0.9)
 # What is the least that rounding moves a guard of size 1.
 ROUNDING = 8 * float(np.finfo(float).eps)
-# Part of its size by which a guard at the instant of a switch may be below its limit and be met by rounding.
-NEAR = 1e-12
 
 # From (integrator, step callback, step limit, longest step) to (outcome, its name, steps taken); called again after an
 # interruption. It returns to Python after some steps each, which changes them by rounding alone.
@@ -32,6 +29,10 @@ Rates = Callable[[float, Array], Array]
 
 class TaylorRun:
     """One run over a problem, by an integrator that is lent for it."""
+
+    _inside = (0.5, 0.9)
+    """Where in a step, as parts of it, its series is compared with the equations: not at its end, where a law may
+    jump."""
 
     def __init__(self, problem: Problem, lent: Any) -> None:
         self.problem = problem
@@ -124,11 +125,11 @@ class TaylorRun:
         time, state = self.integrator.time, self.integrator.state
         beyond = self._beyond(time, state)
         most = beyond.max(initial=-np.inf)
-        # a law that bends where a guard is met, as |i| does where a current ends, may hide it
-        if -NEAR < most <= 0.0 and outcome == "cb_stop":
-            ahead = NEAR * (self.problem.t_end - self.problem.t0)
+        # a law that bends where a guard is met, as |i| does where a current ends, may hide what is met to rounding
+        if -SAME < most <= 0.0 and outcome == "cb_stop":
+            ahead = SAME * (self.problem.t_end - self.problem.t0)
             later = self._beyond(time + ahead, state + ahead * self.program.slopes(time, state, self.integrator.pars))
-            beyond = np.where((beyond > -NEAR) & (later > beyond), later, -np.inf)
+            beyond = np.where((beyond > -SAME) & (later > beyond), later, -np.inf)
         return int(np.argmax(beyond)) if beyond.max(initial=-np.inf) > 0.0 else None
 
     def _beyond(self, time: float, state: Array) -> Array:
@@ -165,7 +166,7 @@ class TaylorRun:
             integrator.step(max_delta_t=min(longest, piece.end - piece.start), write_tc=True)
             step = integrator.time - start
             good = not (step > 0.0 and np.isfinite(integrator.state).all()) or (
-                _satisfied(self.problem, self.problem.rhs, piece, integrator.tc, start, INSIDE[-1] * step, 0.0)
+                _satisfied(self.problem, self.problem.rhs, piece, integrator.tc, start, self._inside[-1] * step, 0.0)
                 and (self.program.all_timed or keeps_sides(self.program, integrator, parameters, start))
             )
             integrator.time = start
@@ -191,10 +192,10 @@ class TaylorRun:
             for (start, end), terms in zip(pairwise(segment.times), segment.tcs, strict=True):
                 if (now := bisect_right(changes, start)) > past:
                     rhs, past = self.resets[now - 1][1](), now
-                for part in INSIDE:
+                for part in self._inside:
                     if not _satisfied(self.problem, rhs, piece, terms, start, part * (end - start), sizes):
                         reason = f"up to t = {end:.9g} s a law has a root or a pole that a Taylor series does not show"
-                        raise SeriesError(str(failure(self.problem, "heyoka", start, terms[:, 0], reason)), reason)
+                        raise SeriesError(str(series_failure(self.problem, start, terms[:, 0], reason)), reason)
 
     def _watch(self, piece: SmoothInterval) -> SwitchWatch | None:
         """Set the signs of the switches; what has to look after them, where the motion may change them."""
@@ -213,7 +214,7 @@ class TaylorRun:
 
     def _failure(self, piece: SmoothInterval, outcome: str, watch: SwitchWatch | None) -> SimulationError:
         time, state = self._last_good(piece, watch)
-        error = failure(self.problem, "heyoka", time, state, self._reason(outcome, watch))
+        error = series_failure(self.problem, time, state, self._reason(outcome, watch))
         if watch is not None and watch.reason is not None:
             return StickingError(str(error), watch.reason.partition(", because")[0], driven_back=watch.driven_back)
         obstacle = f"after t = {time:.9g} s a law, or one of its derivatives, is not finite, as a root's at zero"
@@ -240,6 +241,24 @@ class TaylorRun:
         if watch is not None and watch.reason is not None:
             return watch.reason
         return f"heyoka stopped with the outcome {outcome!r}"
+
+
+def series_failure(problem: Problem, t: float, x: Array, reason: str) -> SimulationError:
+    """The error of a failed run, as `failure` makes it; or the law that has a value there and no series.
+
+    Args:
+        problem: what was to be solved.
+        t: last time reached, s.
+        x: (n,) state there.
+        reason: why the run ended.
+    """
+    if near(problem, problem.explain, t, x) is None and (law := near(problem, problem.rough, t, x)) is not None:
+        return SimulationError(
+            f"The heyoka engine failed at t = {law[0]:.9g} s: {law[1]} has a value there, but not all its branches and "
+            "slopes have one, and a Taylor series computes even those whose condition does not hold. Take "
+            "engine='scipy', or give each a value: a root, a logarithm or a quotient of Max(1e-9, ...)."
+        )
+    return failure(problem, "heyoka", t, x, reason)
 
 
 def _satisfied(

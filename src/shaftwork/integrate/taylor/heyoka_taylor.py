@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 from collections.abc import Sequence
 from functools import cached_property
@@ -10,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from shaftwork.core.errors import MissingExtraError, SimulationError
+from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.engines import ENGINES
 from shaftwork.integrate.problem import Array, Problem, Trajectory
-from shaftwork.integrate.smooth_intervals import PiecewiseDense, both_sides, failure, pieces, reached
-from shaftwork.integrate.taylor.heyoka_run import GUARD, TaylorRun
+from shaftwork.integrate.smooth_intervals import PiecewiseDense, both_sides, pieces, reached
+from shaftwork.integrate.taylor.heyoka_run import GUARD, TaylorRun, series_failure
 from shaftwork.integrate.taylor.heyoka_switches import SwitchWatch
 
 # Steps times states, some 50 ms, after which Python notices Ctrl-C and tells how far the run is.
@@ -29,14 +28,11 @@ def solve(problem: Problem) -> Trajectory:
     the equations in every step.
 
     Raises:
-        MissingExtraError: heyoka is not installed.
         SimulationError: the problem has no heyoka program, or the integration failed; a `SeriesError` where another
             engine may go on.
 
     Source: Biscani, Izzo, Revisiting high-order Taylor methods for astrodynamics and celestial mechanics, MNRAS 2021.
     """
-    if importlib.util.find_spec("heyoka") is None:
-        raise MissingExtraError("heyoka", "fast", "engine='heyoka'")
     if problem.program is None:
         raise SimulationError(
             f"heyoka compiles small networks whose laws have Taylor series. This one, of {problem.x0.size} states, is "
@@ -59,7 +55,7 @@ def _tolerance(problem: Problem) -> float:
     Speeds keep some five digits more than that, in measured motions with gaps and clutches; where torques are larger
     beside them, it is tightened by so much.
     """
-    ordinary = min(max(problem.rtol, ENGINES["heyoka"].finest), ENGINES["heyoka"].loosest)
+    ordinary = min(problem.rtol, ENGINES["heyoka"].loosest)
     finest, coarsest = problem.atol.min(initial=np.inf), problem.atol.max(initial=0.0)
     tightened = problem.rtol * 1e5 * finest / coarsest if 0.0 < finest < coarsest else ordinary
     # in powers of ten, as each value compiles an integrator of its own
@@ -117,7 +113,7 @@ class _TaylorReplay:
                     break
             if self._end is not None and abs(run.integrator.time - self._end) > 1e-6 * (problem.t_end - problem.t0):
                 reason = f"the same run made again for its dense output ends there, not at t = {self._end:.9g} s"
-                raise failure(problem, "heyoka", run.integrator.time, run.state, reason)
+                raise series_failure(problem, run.integrator.time, run.state, reason)
         return tuple(tuple(recorder.segments) for recorder in recorders), run.met
 
     @property

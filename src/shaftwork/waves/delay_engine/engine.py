@@ -14,7 +14,7 @@ import numpy as np
 
 from shaftwork.core.errors import AccuracyWarning
 from shaftwork.core.notices import warn
-from shaftwork.integrate.engines import WAVE
+from shaftwork.integrate.engines import ENGINES
 from shaftwork.integrate.problem import Array
 from shaftwork.integrate.smooth_intervals import pieces
 from shaftwork.numerics.tolerances import SAME
@@ -84,7 +84,7 @@ def on_lattice(problem: DelayProblem) -> DelayTrajectory | None:
     pattern = _first_pattern(problem, period)
     matrices, twice = Matrices.of(problem), 2 * np.repeat(problem.impedances, 2)
     map_of = cache(lambda length: panel_map(matrices, twice, length * period))
-    rtol = max(problem.rtol, WAVE.finest)
+    rtol = max(problem.rtol, ENGINES["wave"].finest)
     # A beginning shows which panels are too long; a motion of 2000 panels shows it as fast.
     resolved = (problem.t_end - problem.t0) / period * len(pattern) < 2_000
     while True:

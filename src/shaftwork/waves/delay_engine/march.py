@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from shaftwork.core.errors import SimulationError
-from shaftwork.integrate.engines import WAVE
+from shaftwork.integrate.engines import ENGINES
 from shaftwork.integrate.guards import GuardWatch
 from shaftwork.integrate.problem import Array, Trajectory
 from shaftwork.integrate.smooth_intervals import PiecewiseDense, failure, pieces, reached, start_of_piece
@@ -78,7 +78,7 @@ class March:
     def __init__(self, problem: DelayProblem, span: tuple[float, float] | None = None) -> None:
         low, high = span or (problem.t0, problem.t_end)
         self._lines = Lines.of(problem.delays)
-        self._rtol = max(problem.rtol, WAVE.finest)
+        self._rtol = max(problem.rtol, ENGINES["wave"].finest)
         self._shortest = min(self._lines.delays)
         self._merge = max(8 * math.ulp(max(abs(low), abs(high))), 1e-4 * self._rtol * self._shortest)
         # the shortest panel
