@@ -205,6 +205,44 @@ def test_a_capacitor_at_a_leg_is_emptied_by_the_switch_that_closes_as_the_other_
     assert sol.energy_residual < 1e-9
 
 
+@pytest.mark.parametrize("t_off", [0.01, 0.02])
+@pytest.mark.parametrize("first", ["opens", "closes"])
+def test_a_coil_goes_on_through_its_diode_while_a_capacitor_is_charged_at_once(first: str, t_off: float) -> None:
+    """One switch opens in series with the coil, then or before another one puts a capacitor on the supply."""
+    net = sw.Network("two at once")
+    net.add(sw.VoltageSource("supply", u=U), "p", "ground")
+    parts = [(sw.Switch("opens", t_off=t_off), "p", "x"), (sw.Switch("closes", t_on=0.02), "p", "q")]
+    for part in parts if first == "opens" else reversed(parts):
+        net.add(*part)
+    net.add(sw.Inductor("L", L=L), "x", "r")
+    net.add(sw.Resistor("R", R=R), "r", "ground")
+    net.add(sw.Diode("diode"), "ground", "x")
+    net.add(sw.Capacitor("C", C=0.001), "q", "ground")
+    sol = net.simulate(0.03)
+    current = U / R * (1 - math.exp(-t_off * R / L)) * math.exp(-(0.03 - t_off) * R / L)
+    assert sol["L.i"][-1] == pytest.approx(current, rel=CLOSE)
+    assert sol["C.u"][-1] == pytest.approx(U, rel=1e-14)
+    assert sol.energy.lost_in["closes"] == pytest.approx(0.001 * U**2 / 2, rel=CLOSE)
+    assert sol.energy.lost_in["opens"] == pytest.approx(0.0, abs=1e-12)
+    assert sol.energy_residual < 1e-9
+
+
+@pytest.mark.filterwarnings("ignore:jumping source")
+def test_a_coil_goes_on_through_its_diode_while_a_supply_jumps_that_has_a_capacitor() -> None:
+    net = sw.Network("jump")
+    net.add(sw.VoltageSource("supply", u=sympy.Piecewise((U, sw.t < 0.02), (2 * U, True))), "p", "ground")
+    net.add(sw.Switch("opens", t_off=0.01), "p", "x")
+    net.add(sw.Inductor("L", L=L), "x", "r")
+    net.add(sw.Resistor("R", R=R), "r", "ground")
+    net.add(sw.Diode("diode"), "ground", "x")
+    net.add(sw.Capacitor("C", C=0.001), "p", "ground")
+    sol = net.simulate(0.03)
+    current = U / R * (1 - math.exp(-0.01 * R / L)) * math.exp(-0.02 * R / L)
+    assert sol["L.i"][-1] == pytest.approx(current, rel=CLOSE)
+    assert sol["C.u"][-1] == pytest.approx(2 * U, rel=1e-14)
+    assert sol.energy_residual < 1e-9
+
+
 @pytest.mark.parametrize("engine", ["heyoka", "scipy", "sundials"])
 @pytest.mark.parametrize(
     "on",

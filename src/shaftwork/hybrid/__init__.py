@@ -32,6 +32,7 @@ Where what is:
     state transfer      hybrid_transfer                 from one combination of modes to another
                         codegen.state_transfer          the states of new equations from all that is stored
     impact              impacts.impacts                 speeds that jump where parts meet
+                        impacts.impact_contacts         what touches, and which of it an impact takes
                         impacts.collisions              the complementarity problem of their impulses
                         impacts.impulses                impulses on their way through gears that rub
 

@@ -30,10 +30,10 @@ class Commutation:
         modes = with_modes(state.regime.modes, changed)
         plain = self._transfer.to_modes(state, after, modes)
         names = plain.regime.stores.through
-        if plain.x is not state.x and names and not self._keeps(after, state, plain, names):
-            for other, led in self._keeping(after, state, modes, takeovers(self._machines, modes), names):
-                if not exceeded(other, after, other)[1]:
-                    return other, self._transitions(t, state, changed | led)
+        if plain.x is state.x or not names or self._keeps(after, state, plain, names):
+            return plain, self._transitions(t, state, changed)
+        if goes_on := self._keeping(after, state, modes, takeovers(self._machines, modes), names):
+            return goes_on[0], self._transitions(t, state, changed | goes_on[1])
         return plain, self._transitions(t, state, changed)
 
     def switched(self, t: float, after: float, state: HybridState, number: int, to: str) -> EventOutcome | None:
@@ -52,9 +52,8 @@ class Commutation:
         new_modes, names = with_modes(modes, changed), state.regime.stores.names
         # diodes that begin to conduct, and those that no longer do
         options = [*_led(self._machines, new_modes, ACROSS), *_led(self._machines, new_modes, -THROUGH)]
-        for new, led in self._keeping(after, state, new_modes, _sets(options, 0), names):
-            if not any(self._machines[active.machine].is_one_way for _, active in exceeded(new, after, new)[1]):
-                return new, self._transitions(t, state, changed | led)
+        if goes_on := self._keeping(after, state, new_modes, _sets(options, 0), names):
+            return goes_on[0], self._transitions(t, state, changed | goes_on[1])
         opens = {k: to for k, to in changed.items() if not self._machines[k].is_rigid(to)}
         if not 0 < len(opens) < len(changed):
             return None
@@ -67,13 +66,19 @@ class Commutation:
 
     def _keeping(
         self, t: float, state: HybridState, modes: ModeNames, sets: Iterable[dict[int, str]], names: Sequence[str]
-    ) -> Iterator[tuple[HybridState, dict[int, str]]]:
-        """Of modes with other ones of diodes those in which what is stored under some names goes on."""
+    ) -> tuple[HybridState, dict[int, str]] | None:
+        """The first of sets of diodes with which what is stored under some names goes on, and the state in their modes.
+
+        No diode is about to change again; a switch may be, whose transition follows.
+        """
         for pairs in sets:
             with suppress(NetworkError):
                 other = self._transfer.to_modes(state, t, with_modes(modes, pairs))
-                if self._keeps(t, state, other, names):
-                    yield other, pairs
+                if not self._keeps(t, state, other, names):
+                    continue
+                if not any(self._machines[active.machine].is_one_way for _, active in exceeded(other, t, other)[1]):
+                    return other, pairs
+        return None
 
     def _keeps(self, t: float, state: HybridState, other: HybridState, names: Sequence[str]) -> bool:
         """Whether what is stored under some names, torques or speeds, is the same in other modes."""

@@ -19,7 +19,7 @@ Source: Pfeiffer and Glocker, Multibody Dynamics with Unilateral Contacts, 1996,
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from operator import itemgetter
 from typing import NamedTuple
 
@@ -27,111 +27,15 @@ import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.state_transfer import Mobility, complementary
-from shaftwork.components.branches import ACROSS
 from shaftwork.components.modes import Leave
 from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import SimulationError
-from shaftwork.hybrid.consistency import CLEAR, NOTHING
 from shaftwork.hybrid.hybrid_state import HybridState, Regime
 from shaftwork.hybrid.hybrid_transfer import HybridTransfer
+from shaftwork.hybrid.impacts.impact_contacts import Contact, in_turn, lasting, nodes, opens_at, touching
 from shaftwork.hybrid.impacts.impulses import NOTHING_OF, ImpactStage, ImpactStart, ImpulseOutcome, Impulses, summed
 from shaftwork.hybrid.modes.mode_equations import KEPT
-from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, GivesWay, ModeMachine, ModeNames, limited, with_modes
-
-
-class Contact(NamedTuple):
-    """What cannot close further, be it closed or only touching.
-
-    Args:
-        number: of the machine.
-        side: 1 where it opens as the speed across it rises, -1 where as that falls.
-        apart: mode in which it is open.
-        joined: mode in which it is closed.
-        leave: by which it closes; None where it is closed already.
-        restitution: of what it hits with, and
-        rest: speed up to which nothing is thrown back.
-    """
-
-    number: int
-    side: float
-    apart: str
-    joined: str
-    leave: Leave | None = None
-    restitution: float = 0.0
-    rest: float = 0.0
-
-    def share_back(self, opens: float) -> float:
-        """The share of the speed at which it closes that comes back, for the speed at which it opens."""
-        return self.restitution if -opens * self.restitution > self.rest else 0.0
-
-
-def lasting(machines: Sequence[ModeMachine], modes: ModeNames) -> Iterator[Contact]:
-    """Contacts that are closed, and freewheels."""
-    for k, (machine, name) in enumerate(zip(machines, modes, strict=True)):
-        mode = machine.modes[name]
-        if (side := machine.opening_side(name)) is not None:
-            yield Contact(k, side, mode.gives_way[0][1], name)
-        for leave in mode.leaves:
-            side = machine.opening_side(leave.to) if leave.to and leave.when == ACROSS else None
-            if side is not None:
-                yield Contact(k, side, name, leave.to, leave)
-
-
-def touching(t: float, state: HybridState, number: int, leave: Leave) -> Iterator[Contact]:
-    """Contacts that are closed or touch, freewheels, and the machine of a number, which wants to close by a `leave`."""
-    regime, here = state.regime, state.course(t)
-    machines, now, bands = regime.machines, here[3], regime.bands(here)
-    closed = [*lasting(machines, regime.modes)]
-    yield from closed
-    yield from _other_flanks(state, closed)
-    for active in regime.watched:
-        k, closes, guard = active.machine, active.leave, active.guard
-        wants = k == number and closes.to == leave.to
-        touches = closes.rebound is not None and active.side * now[guard] > -CLEAR * bands[guard]
-        side = machines[k].opening_side(closes.to) if (wants or touches) and closes.to else None
-        if side is not None and not any(c.number == k and c.joined == closes.to for c in closed):
-            yield _closing(state, k, side, leave if wants else closes)
-
-
-def _other_flanks(state: HybridState, closed: Sequence[Contact]) -> Iterator[Contact]:
-    """Flanks that touch while the other one of their machine is closed, as there is no gap between them."""
-    regime = state.regime
-    for contact in closed:
-        machine, place = regime.machines[contact.number], regime.equations.twist(contact.number)
-        for leave in machine.modes[contact.apart].leaves if place is not None else ():
-            if leave.rebound is None or leave.to == contact.joined:
-                continue
-            side, (limit, slope) = machine.opening_side(leave.to), regime.twist_limit(contact.number, leave)
-            if side is not None and slope * (state.x[place] - limit) > -NOTHING:
-                yield _closing(state, contact.number, side, leave, contact.apart)
-
-
-def _closing(state: HybridState, number: int, side: float, leave: Leave, apart: str = "") -> Contact:
-    """What closes by a `leave` from the mode that it is in, or from another one in which it is apart."""
-    restitution, rest = (state.regime.constant(number, expression) for expression in (leave.rebound, leave.rest))
-    return Contact(number, side, apart or state.regime.modes[number], leave.to, leave, restitution, rest)
-
-
-def nodes(state: HybridState, contact: Contact) -> tuple[int, int]:
-    """The nodes of a contact, that first whose speed opens it."""
-    machine = state.regime.machines[contact.number]
-    part = state.regime.equations.parts[machine.part.name]
-    first, second = map(part.node_at, part.ends_of(machine.modes)[:: int(contact.side)])
-    return first, second
-
-
-def opens_at(t: float, state: HybridState, contacts: Sequence[Contact]) -> list[float]:
-    """The speeds at which contacts open."""
-    speeds = state.speeds([contact.number for contact in contacts], t)
-    return [contact.side * speed for contact, speed in zip(contacts, speeds, strict=True)]
-
-
-def in_turn(t: float, state: HybridState, contacts: list[Contact]) -> list[Contact]:
-    """The contacts that take part where impacts follow each other: of those that throw back only the fastest."""
-    speeds = {c: -opens for c, opens in zip(contacts, opens_at(t, state, contacts), strict=True)}
-    thrown = [speed for c, speed in speeds.items() if c.share_back(-speed)]
-    fastest = (1 - NO_IMPACT) * max(thrown, default=0.0)
-    return [c for c, speed in speeds.items() if not (thrown and c.restitution) or speed >= fastest]
+from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, GivesWay, ModeNames, limited, with_modes
 
 
 class Collision(NamedTuple):
@@ -185,7 +89,7 @@ class Collisions:
             return (contact.number, contact.joined) == (number, leave.to)
 
         # without a gap the other flank of the machine touches too; of two that are closed the last one tells the mode
-        candidates = sorted(touching(t, state, number, leave), key=is_wanted)
+        candidates = self._opening(t, state, modes, sorted(touching(t, state, number, leave), key=is_wanted))
         meets = -min(opens_at(t, state, candidates), default=0.0) > NOTHING_OF * state.top_speed
         contacts = in_turn(t, state, candidates) if meets and not self._together else candidates
         before = np.array(opens_at(t, state, contacts))
@@ -237,7 +141,7 @@ class Collisions:
             modes: that are to go on.
             least: speed up to which a machine stays as it is.
         """
-        contacts = [*lasting(self._machines, modes)]
+        contacts = self._opening(before, state, modes, [*lasting(self._machines, modes)])
         start = self._apart(before, state, modes, contacts)
         stages = self._compressed(t, start, contacts)
         hit = [c for c, i in zip(contacts, _pressed(stages), strict=True) if i > 0]
@@ -356,6 +260,24 @@ class Collisions:
         apart = {k: sides[0][1] for k, sides in self._rubbing(modes).items()} | {c.number: c.apart for c in contacts}
         loose = with_modes(modes, apart)
         return self._impulses.begins(self._transfer.with_stored(loose, t, state.stored(t)), t)
+
+    def _opening(self, t: float, state: HybridState, modes: ModeNames, contacts: list[Contact]) -> list[Contact]:
+        """The contacts that an impact may open: not diodes and freewheels that alone let a current or torque go on."""
+        names, stored = state.regime.stores.through, state.stored(t)
+        carrying = [c for c in contacts if c.leave is None and self._machines[c.number].is_one_way]
+
+        def keeps(opened: Sequence[Contact]) -> bool:
+            start = self._apart(t, state, modes, opened)
+            changed = sum(abs(start.stored[name] - stored[name]) for name in names)
+            return changed <= NO_IMPACT * sum(abs(stored[name]) for name in names)
+
+        if not (names and carrying) or keeps(contacts):
+            return contacts
+        opened = [c for c in contacts if c not in carrying]
+        for contact in carrying:
+            if keeps([*opened, contact]):
+                opened.append(contact)
+        return [c for c in contacts if c in opened]
 
     def _rubbing(self, modes: ModeNames) -> dict[int, GivesWay]:
         """Machines that hold by torques limited on both sides, with the modes to which these lead."""

@@ -12,7 +12,8 @@ from shaftwork.core.errors import NetworkError, SimulationError
 from shaftwork.hybrid.consistency import CLEAR
 from shaftwork.hybrid.hybrid_state import EventOutcome, HybridState, Transition, differences
 from shaftwork.hybrid.hybrid_transfer import HybridTransfer
-from shaftwork.hybrid.impacts.collisions import Collisions, in_turn, opens_at, touching
+from shaftwork.hybrid.impacts.collisions import Collisions
+from shaftwork.hybrid.impacts.impact_contacts import in_turn, opens_at, touching
 from shaftwork.hybrid.impacts.impulses import ImpactStage, ImpulseOutcome, Impulses
 from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, ActiveGuard, ModeNames, limited, with_modes
 
