@@ -158,16 +158,8 @@ def application(session: Session, token: str, port: int) -> Starlette:
         return Response(content, 422 if refused else 200, media_type="text/plain" if refused else FILES[name])
 
     async def answers(line: WebSocket) -> None:
-        await line.accept()
-        desk = Desk()
-        listening = asyncio.create_task(desk.listen(line))
         with contextlib.suppress(WebSocketDisconnect):  # the page may be closed before it is answered
-            while await desk.comes():
-                async with one:
-                    answer = await asyncio.to_thread(_answered, session, desk.take(), desk.waits)
-                if desk.waits():
-                    await line.send_text(answer)
-        await listening
+            await _converse(line, session, one)
 
     return starlette.Starlette(  # type: ignore[no-any-return]
         routes=[
@@ -181,6 +173,21 @@ def application(session: Session, token: str, port: int) -> Starlette:
             Middleware(Admission, token=token, port=port),
         ],
     )
+
+
+async def _converse(line: WebSocket, session: Session, one: asyncio.Lock) -> None:
+    """Answer the newest request of a page, until it leaves."""
+    await line.accept()
+    desk = Desk()
+    listening = asyncio.create_task(desk.listen(line))
+    try:
+        while await desk.comes():
+            async with one:
+                answer = await asyncio.to_thread(_answered, session, desk.take(), desk.waits)
+            if desk.waits():
+                await line.send_text(answer)
+    finally:
+        listening.cancel()
 
 
 def _answered(session: Session, text: str, waits: Callable[[], bool]) -> str:
