@@ -6,6 +6,7 @@ import re
 import xml.etree.ElementTree as ET
 from collections import defaultdict
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from itertools import combinations, pairwise
 from pathlib import Path
 
@@ -14,7 +15,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import shaftwork as sw
-from shaftwork.drawing.canvas import Drawing, DrawnGroup, box_of
+from shaftwork.drawing.canvas import Drawing, DrawnGroup
+from shaftwork.drawing.texts import box_of
 from shaftwork.scenes import SCENES
 from tests.properties.examples import network_of
 from tests.strategies import Network, networks
@@ -52,41 +54,75 @@ def crosses(segment: Segment, box: Box, margin: float) -> bool:
     return line[0] <= grown[2] and grown[0] <= line[2] and line[1] <= grown[3] and grown[1] <= line[3]
 
 
-def read_back(drawing: Drawing) -> tuple[dict[str, list[Segment]], dict[str, list[Box]]]:
-    """The wires of each node, and the boxes of the symbols of each part, from the SVG alone; y points down."""
-    wires: dict[str, list[Segment]] = defaultdict(list)
-    symbols: dict[tuple[str, str], list[Point]] = defaultdict(list)
-    for group in ET.fromstring(drawing.svg).iter("{http://www.w3.org/2000/svg}g"):  # noqa: S314 (our own)
-        order, _, name = group.get("id", "").split(":", 2) if group.get("id", "").count(":") >= 2 else ("", "", "")
-        path = group.find("{http://www.w3.org/2000/svg}path")
-        if path is None or not name:
-            continue
-        numbers = [float(text) for text in re.findall(r"-?[\d.]+", path.get("d", ""))]
-        points = list(zip(numbers[::2], numbers[1::2], strict=True))
-        if name.startswith("node ") and "C" not in path.get("d", ""):
-            wires[name.removeprefix("node ")] += pairwise(points)
-        elif name.startswith("part "):
-            symbols[order, name.removeprefix("part ")] += points
+SVG = "{http://www.w3.org/2000/svg}"
+NUMBER = re.compile(r"-?[\d.]+")
+
+
+def points_of(shape: ET.Element) -> list[Point]:
+    """The corners of a path, the ends of an arc, or the corners of the square around a circle; y points down."""
+    if shape.tag == f"{SVG}circle":
+        x, y, r = (float(shape.get(key, "")) for key in ("cx", "cy", "r"))
+        return [(x + dx, y + dy) for dx in (-r, r) for dy in (-r, r)]
+    path = re.sub(r"A\S+ \S+ \S+ \S+ \S+", "", shape.get("d", ""))
+    numbers = [float(text) for text in NUMBER.findall(path)]
+    return list(zip(numbers[::2], numbers[1::2], strict=True))
+
+
+@dataclass
+class Wires:
+    """The lines of a node, and the corners of its marks with the name beside each."""
+
+    lines: list[Segment] = field(default_factory=list)
+    heads: list[list[Point]] = field(default_factory=list)
+    names: list[str] = field(default_factory=list)
+
+
+def read_back(drawing: Drawing) -> tuple[dict[str, Wires], dict[str, list[Box]]]:
+    """The wires of each node, and the boxes of the symbols of each part, from the SVG alone."""
+    wires: dict[str, Wires] = {}
     boxes: dict[str, list[Box]] = defaultdict(list)
-    for (_, name), points in symbols.items():
-        xs, ys = zip(*points, strict=True)
-        boxes[name].append((min(xs), min(ys), max(xs), max(ys)))
+    for group in ET.fromstring(drawing.svg).iter(f"{SVG}g"):  # noqa: S314 (our own)
+        name = group.get("id", "").partition(":")[2]
+        shapes = [shape for shape in group if shape.tag in (f"{SVG}path", f"{SVG}circle")]
+        if name.startswith("node "):
+            lines = [pair for shape in shapes if shape.get("fill") == "none" for pair in pairwise(points_of(shape))]
+            heads = [points_of(shape) for shape in shapes if shape.tag == f"{SVG}path" and shape.get("fill") != "none"]
+            names = ["".join(run.text or "" for run in text) for text in group.iter(f"{SVG}text")]
+            wires[name.removeprefix("node ")] = Wires(lines, heads, names)
+        elif name.startswith("part "):
+            xs, ys = zip(*(point for shape in shapes for point in points_of(shape)), strict=True)
+            boxes[name.removeprefix("part ")].append((min(xs), min(ys), max(xs), max(ys)))
     return wires, boxes
 
 
-def connected(segments: list[Segment]) -> bool:
-    """Whether lines are one, where the end of one lies on another."""
-    if not segments:
-        return True
-    done, pending = {0}, [0]
-    while pending:
-        first = segments[pending.pop()]
-        for k, other in enumerate(segments):
-            ends = any(crosses((p, p), box_around(first), 0.1) for p in other)
-            if k not in done and (ends or any(crosses((p, p), box_around(other), 0.1) for p in first)):
-                done.add(k)
-                pending.append(k)
-    return len(done) == len(segments)
+def pieces_of(lines: list[Segment]) -> list[list[Segment]]:
+    """Lines that belong together, where the end of one lies on another."""
+    pieces, left = [], list(lines)
+    while left:
+        piece = [left.pop()]
+        for line in piece:
+            touching = [
+                other
+                for other in left
+                if any(crosses((p, p), box_around(line), 0.1) for p in other)
+                or any(crosses((p, p), box_around(other), 0.1) for p in line)
+            ]
+            piece += touching
+            left = [other for other in left if other not in touching]
+        pieces.append(piece)
+    return pieces
+
+
+def is_one(node: str, wires: Wires) -> bool:
+    """Whether the lines of a node are one, or each piece of them ends at its name."""
+    pieces = pieces_of(wires.lines)
+    marked = [
+        piece
+        for piece in pieces
+        if any(crosses(line, box_around((p, p)), NEAR) for line in piece for head in wires.heads for p in head)
+    ]
+    named = len(wires.names) == len(wires.heads) and set(wires.names) <= {node}
+    return named and (len(pieces) <= 1 or len(marked) == len(pieces))
 
 
 def box_around(segment: Segment) -> Box:
@@ -97,20 +133,21 @@ def box_around(segment: Segment) -> Box:
 def check(net: sw.Network, *, as_circuit: bool, expected: dict[str, set[str]], analogy: str = "force-current") -> None:
     drawing = net.draw(as_circuit=as_circuit, analogy=analogy, values=True)
     parts = [group for group in drawing.groups if group.name.startswith("part ")]
-    boxes = [box for group in parts for box in boxes_of(group)]
+    named = [box for group in drawing.groups if group.name.startswith("node ") for box in map(box_of, group.texts)]
+    boxes = [*named, *(box for group in parts for box in boxes_of(group))]
     overlapping = [(a, b) for a, b in combinations(boxes, 2) if meet(a, b)]
     assert not overlapping
     wires, symbols = read_back(drawing)
     assert set(symbols) == {part for part, nodes in expected.items() if nodes}
-    for node, segments in wires.items():
-        assert connected(segments), node
+    for node, lines in wires.items():
+        assert is_one(node, lines), node
     for part, places in symbols.items():
-        touched = {node for node, lines in wires.items() for box in places for s in lines if crosses(s, box, NEAR)}
+        touched = {node for node, each in wires.items() for box in places for s in each.lines if crosses(s, box, NEAR)}
         assert touched == expected[part], part
-    texts = [box for group in parts for box in map(box_of, group.texts)]
-    lines = [s for group in drawing.groups if group.name.startswith("node ") for stroke in group.strokes
-             if not stroke.radius for s in pairwise(stroke.points)]  # fmt: skip
-    assert not [(s, box) for s in lines for box in texts if crosses(s, box, -NEAR)]
+    texts = [*named, *(box for group in parts for box in map(box_of, group.texts))]
+    segments = [s for group in drawing.groups if group.name.startswith("node ") for stroke in group.strokes
+                if not stroke.radius for s in pairwise(stroke.points)]  # fmt: skip
+    assert not [(s, box) for s in segments for box in texts if crosses(s, box, -NEAR)]
 
 
 def nodes_of(net: sw.Network) -> dict[str, set[str]]:

@@ -27,7 +27,12 @@ def refuse_analogy(analogy: str, *, as_circuit: bool) -> None:
 
 
 def picture(
-    equations: Equations, in_phase: tuple[CircuitGraph, str | NamedPhase] | None, *, as_circuit: bool, values: bool
+    equations: Equations,
+    in_phase: tuple[CircuitGraph, str | NamedPhase] | None,
+    *,
+    as_circuit: bool,
+    values: bool,
+    width: float,
 ) -> Drawing:
     """A drive train or its circuit.
 
@@ -36,13 +41,17 @@ def picture(
         in_phase: where a phase is drawn, the graph of the network and the phase.
         as_circuit: whether it is drawn as a circuit.
         values: whether the values of parameters are written.
+        width: of the drawing, pt.
     """
     modes = {} if in_phase is None else _words_of_modes(*in_phase)
     graph, items = equations.form.graph, circuit_items if as_circuit else train_items
-    return drawn(graph, tuple(items(Letters(graph, equations.symbol_names, values, modes))), train=not as_circuit)
+    letters = Letters(graph, equations.symbol_names, values, modes)
+    return drawn(graph, tuple(items(letters)), train=not as_circuit, width=width)
 
 
-def dual_picture(equations: Equations, dual: CircuitGraph, branches: Mapping[str, int], values: bool) -> Drawing:  # noqa: FBT001
+def dual_picture(
+    equations: Equations, dual: CircuitGraph, branches: Mapping[str, int], *, values: bool, width: float
+) -> Drawing:
     """The dual circuit with the letters of the drive train.
 
     Args:
@@ -50,9 +59,10 @@ def dual_picture(equations: Equations, dual: CircuitGraph, branches: Mapping[str
         dual: the graph of its dual.
         branches: by name of a part of the dual the branch of the network that it is the dual of.
         values: whether the values of parameters are written.
+        width: of the drawing, pt.
     """
     letters = Letters(equations.form.graph, equations.symbol_names, values, {})
-    return drawn(dual, tuple(_dual_items(letters, dual, branches)), train=False)
+    return drawn(dual, tuple(_dual_items(letters, dual, branches)), train=False, width=width)
 
 
 def _words_of_modes(graph: CircuitGraph, phase: str | NamedPhase) -> dict[str, str]:
