@@ -116,11 +116,8 @@ def pieces_of(lines: list[Segment]) -> list[list[Segment]]:
 def is_one(node: str, wires: Wires) -> bool:
     """Whether the lines of a node are one, or each piece of them ends at its name."""
     pieces = pieces_of(wires.lines)
-    marked = [
-        piece
-        for piece in pieces
-        if any(crosses(line, box_around((p, p)), NEAR) for line in piece for head in wires.heads for p in head)
-    ]
+    heads = [(min(xs), min(ys), max(xs), max(ys)) for xs, ys in (zip(*head, strict=True) for head in wires.heads)]
+    marked = [piece for piece in pieces if any(crosses(line, head, 0.1) for line in piece for head in heads)]
     named = len(wires.names) == len(wires.heads) and set(wires.names) <= {node}
     return named and (len(pieces) <= 1 or len(marked) == len(pieces))
 
