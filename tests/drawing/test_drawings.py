@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import re
 import xml.etree.ElementTree as ET
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import combinations, pairwise
+from itertools import combinations, pairwise, permutations
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -138,6 +140,8 @@ def check(net: sw.Network, *, as_circuit: bool, expected: dict[str, set[str]], a
     assert set(symbols) == {part for part, nodes in expected.items() if nodes}
     for node, lines in wires.items():
         assert is_one(node, lines), node
+    for (_, one), (_, other) in permutations(wires.items(), 2):
+        assert not [(s, t) for s in one.lines for p in s for t in other.lines if crosses((p, p), box_around(t), 0.1)]
     for part, places in symbols.items():
         touched = {node for node, each in wires.items() for box in places for s in each.lines if crosses(s, box, NEAR)}
         assert touched == expected[part], part
@@ -177,6 +181,73 @@ def test_the_drawing_of_a_dual_has_its_connections_and_no_overlap(pieces: Networ
     except sw.NetworkError:
         return
     check(net, as_circuit=True, expected=nodes_of(dual), analogy="force-voltage")
+
+
+@pytest.mark.parametrize("form", [{}, {"as_circuit": True}, {"as_circuit": True, "analogy": "force-voltage"}])
+@pytest.mark.parametrize("width", [500.0, 680.0])
+def test_a_chain_of_a_hundred_inertias_stays_within_the_width(form: dict[str, Any], width: float) -> None:
+    left, _, right, _ = sw.scenes.shaft_chain(m=100).draw(values=True, width=width, **form).size
+    assert right - left <= width
+
+
+def test_with_infinite_width_a_chain_is_one_row_without_marks() -> None:
+    drawing = sw.scenes.shaft_chain(m=30).draw(width=math.inf)
+    assert len({group.strokes[0].points[0][1] for group in drawing.groups if group.name.startswith("part J")}) == 1
+    assert not any(group.texts for group in drawing.groups if group.name.startswith("node "))
+
+
+def test_a_node_from_which_much_hangs_goes_on_in_the_next_row() -> None:
+    net = sw.Network("twenty loads")
+    net.add(sw.Inertia("J", J=1.0), "rotor")
+    for k in range(20):
+        net.add(sw.Damper(f"load {k}", d=1.0), "rotor")
+    check(net, as_circuit=False, expected=nodes_of(net))
+    left, _, right, _ = net.draw(values=True).size
+    assert right - left <= 680.0
+
+
+@pytest.mark.parametrize("width", [0.0, -1.0, math.nan, "wide"])
+def test_a_width_that_is_none_is_refused(width: Any) -> None:
+    with pytest.raises(sw.ParameterError, match=r"width = .* must be a number of points above 0"):
+        sw.scenes.crane().draw(width=width)
+
+
+def planetary() -> sw.Network:
+    net = sw.Network("planetary gear")
+    net.add(sw.PlanetaryGear("gear", ratio=3.0), "sun", "carrier", "ring")
+    for node in ("sun", "carrier", "ring"):
+        net.add(sw.Inertia(f"J {node}", J=1.0), node)
+        net.add(sw.Damper(f"d {node}", d=1.0), node)
+    return net
+
+
+def test_a_planetary_gear_is_a_transformer_with_three_windings_each_at_its_node() -> None:
+    net = planetary()
+    check(net, as_circuit=True, expected=nodes_of(net))
+    (group,) = [group for group in net.draw(as_circuit=True).groups if group.name == "part gear"]
+    assert [text.words for text in group.texts] == ["sun", "ring", "carrier", r"$i_{\mathrm{gear}}$"]
+    half_turns = [stroke for stroke in group.strokes if stroke.radius and stroke.angles != (0.0, 360.0)]
+    assert len(half_turns) == 3 * 3
+
+
+def test_the_transformers_of_a_planetary_gear_in_the_dual_have_their_own_ratios() -> None:
+    """The sun has 1 turn, the ring 3 and the carrier 1 + 3 (Willis)."""
+    drawing = planetary().draw(as_circuit=True, analogy="force-voltage")
+    words = {group.name: [text.words for text in group.texts] for group in drawing.groups}
+    ratios = {line for name in words if name.startswith("part gear ") for line in words[name] if " : " in line}
+    assert ratios == {"0.33333 : 1", "0.25 : 1"}
+
+
+@pytest.mark.parametrize("ends", [("a", "b", "c", "d"), ("a", "ground", "c", "d"), ("a", "b", "ground", "d")])
+def test_a_transformer_with_floating_ends_has_two_coils_at_its_nodes(ends: tuple[str, ...]) -> None:
+    net = sw.Network("transformer")
+    net.add(sw.Transformer("T", ratio=2.0), *ends)
+    for node in dict.fromkeys(ends):
+        if node != "ground":
+            net.add(sw.Capacitor(f"C {node}", C=1.0), node, "ground")
+    check(net, as_circuit=True, expected=nodes_of(net))
+    (group,) = [group for group in net.draw(as_circuit=True).groups if group.name == "part T"]
+    assert len([stroke for stroke in group.strokes if stroke.radius and stroke.angles != (0.0, 360.0)]) == 2 * 3
 
 
 def test_a_dual_has_the_letters_of_its_drive_train() -> None:

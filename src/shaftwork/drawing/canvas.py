@@ -96,7 +96,11 @@ class Drawing:
             for text in group.texts:
                 runs, bars = letters_of(text)
                 for run in runs:
-                    style = {"family": run.family, "style": "oblique" if run.slanted else "normal", "zorder": order}
+                    style: dict[str, Any] = {
+                        "family": run.family,
+                        "style": "oblique" if run.slanted else "normal",
+                        "zorder": order,
+                    }
                     axes.text(run.x, run.y, run.words, size=run.size, parse_math=False, va="baseline", **style)
                 for bar in bars:
                     _draw(axes, bar, order)

@@ -274,9 +274,13 @@ def _coupling(branch: GraphBranch, part: GraphPart, letters: Letters) -> Iterato
 
 
 def _windings(terms: Sequence[tuple[Expr, End, End]], part: GraphPart, graph: CircuitGraph) -> Iterator[Winding]:
-    """A winding for each term of a coupling."""
+    """A winding for each term of a coupling; one with a grounded end has it last."""
     ports = {node: plain(port) for port, node in part.nodes.items()} if len(terms) > 2 else {}
     for factor, plus, minus in terms:
         values = {symbol: graph.parameters[f"{part.name}.{symbol.name}"] for symbol in factor.free_symbols}
         sign = 1 if float(factor.subs(values)) > 0.0 else -1
-        yield Winding(plus, minus, sign, ports.get(plus, "") if minus == GROUND else "")
+        yield (
+            Winding(minus, GROUND, -sign, ports.get(minus, ""))
+            if plus == GROUND
+            else Winding(plus, minus, sign, ports.get(plus, "") if minus == GROUND else "")
+        )

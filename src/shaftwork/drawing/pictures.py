@@ -81,20 +81,25 @@ def _dual_items(letters: Letters, dual: CircuitGraph, branches: Mapping[str, int
         branches: by name of a part of the dual the branch of the train that it is the dual of.
     """
     items = [
-        replace(item, lines=_lines(letters, item, branches))
+        replace(item, lines=_lines(letters, item, branches, dual))
         for item in circuit_items(Letters(dual, {}, letters.values, {}))
     ]
     yield from _in_columns(items)
 
 
-def _lines(letters: Letters, item: Item, branches: Mapping[str, int]) -> tuple[str, ...]:
-    """The letters of what an item is the dual of; a part that it does not have there has its name."""
+def _lines(letters: Letters, item: Item, branches: Mapping[str, int], dual: CircuitGraph) -> tuple[str, ...]:
+    """The letters of what an item is the dual of; a part that it does not have there has its name.
+
+    A coupling of three speeds is two transformers, whose ratios are no parameters: they are in numbers.
+    """
     if item.part not in branches:
         return item.lines
     branch = letters.graph.branches[branches[item.part]]
     part = letters.graph.parts[branch.part]
     if not branch.terms:
         return tuple(letters.of_branch(branch, part, dual=True))
+    if len(branch.terms) > 2:
+        return *item.lines, f"{dual.parameters[f'{item.part}.ratio']:.5g} : 1"
     lines = tuple(letters.of_part(part))
     letter = lines[0].split(" = ")[0].strip("$") if lines else ""
     return (f"$1/{letter}$", *(line for line in lines if " = " in line)) if letter else lines

@@ -123,9 +123,11 @@ class Row:
         used: dict[int, list[tuple[int, int]]] = defaultdict(list)
         for number in sorted(range(len(self.joints)), key=lambda n: (self.spans[n][1] - self.spans[n][0], n)):
             low, high = self.spans[number]
-            wound = any(self._is_wound(self.stations[place]) for place in (low, high))
+            wound = {place for place in (low, high) if self._is_wound(self.stations[place])}
             track = 0 if high == low + 1 and (low, high) not in used[0] and not wound else 1
-            while track and any(low < last and begin < high for begin, last in used[track]):
+            while track and any(
+                (low < last and begin < high) or not wound.isdisjoint((begin, last)) for begin, last in used[track]
+            ):
                 track += 1
             tracks[number] = track
             used[track].append((low, high))

@@ -150,7 +150,7 @@ CIRCUIT: Mapping[str, Shape] = {
     ),
     "line": Shape(
         (
-            *_leads(10.0, 44.0),
+            *_leads(4.0, 44.0),
             line((10.0, 6.0), (44.0, 6.0)),
             line((10.0, -6.0), (44.0, -6.0)),
             Stroke(((10.0, 0.0),), radius=6.0, angles=(90.0, 270.0)),

@@ -23,7 +23,7 @@ class Winding:
     """A winding of a coupling, the sum of whose factors times voltages is zero.
 
     Args:
-        plus, minus: its nodes, or `GROUND`.
+        plus, minus: its nodes; the second may be `GROUND`.
         factor: sign of its factor; a dot marks the end to which its voltage points.
         name: of the end, where it has one.
     """
@@ -63,13 +63,13 @@ def core(windings: Sequence[Winding], pitch: float) -> Core:
     """
     facing = len(windings) == 2
     apart = 2 * RADIUS + 10.0 if facing else max(pitch, RETURN + RADIUS + 18.0)
-    strokes, pins, middles = [], [], []
+    strokes, pins, middles = list[Stroke](), list[float](), list[float]()
     for number, winding in enumerate(windings):
         x = RETURN + 6.0 + number * apart
         side = -1 if facing and number == 1 else 1
         strokes += _winding(winding, x, side)
         middles.append(x)
-        pins += [x] * (winding.plus != GROUND) + [x - side * RETURN] * (winding.minus != GROUND)
+        pins += [x] if winding.minus == GROUND else [x, x - side * RETURN]
     behind = list(_limbs(middles, facing=facing))
     width = middles[-1] + RETURN + 6.0 + (0.0 if facing else RADIUS)
     return Core((*behind, *strokes), tuple(pins), tuple(middles), width)
@@ -89,11 +89,7 @@ def _winding(winding: Winding, x: float, side: int) -> Iterator[Stroke]:
     """A coil that bulges to a side, with the wires from its ends: up to the line, or down to the reference."""
     yield from coil((x, TOP), (0.0, -1.0), TURNS, RADIUS, side)
     back = x - side * RETURN
-    if winding.plus == GROUND:
-        yield line((x, TOP), (back, TOP), (back, EARTHED))
-        yield from (stroke.moved((back, EARTHED)) for stroke in EARTH)
-    else:
-        yield line((x, 0.0), (x, TOP))
+    yield line((x, 0.0), (x, TOP))
     if winding.minus == GROUND:
         yield line((x, FOOT), (x, EARTHED))
         yield from (stroke.moved((x, EARTHED)) for stroke in EARTH)
