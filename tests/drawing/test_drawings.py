@@ -285,6 +285,13 @@ def test_another_end_of_a_file_is_refused(tmp_path: Path) -> None:
         sw.scenes.crane().draw().save(tmp_path / "crane.gif")
 
 
+@pytest.mark.parametrize("ending", ["png", "tex"])
+def test_a_file_that_no_program_could_read_is_refused(tmp_path: Path, ending: str) -> None:
+    drawing = sw.scenes.shaft_chain(m=600).draw(values=True, width=300.0)
+    with pytest.raises(sw.ParameterError, match=rf"pt long, and a file \.{ending} may have .* choose a width="):
+        drawing.save(tmp_path / f"chain.{ending}")
+
+
 def test_a_phase_is_drawn_with_contacts_and_its_words() -> None:
     net = sw.scenes.six_phases()
     drawing = net.draw(as_circuit=True, phase=net.start_phase())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -29,6 +30,10 @@ if TYPE_CHECKING:
 MARGIN = 10.0
 """Around a drawing, pt."""
 FORMATS = ("svg", "pdf", "png", "tex")
+RESOLUTION = 200
+"""Of a picture, pixels per inch."""
+LARGEST = {"png": 2**16 * 72 / RESOLUTION, "tex": 16383.0}
+"""The longest side, pt: pictures have 2^16 pixels, and TeX's lengths end at 2^14 pt."""
 
 
 @dataclass(frozen=True)
@@ -110,13 +115,20 @@ class Drawing:
         """Write it; the format follows from the end of the name: .svg, .pdf, .png, or .tex for TikZ.
 
         Raises:
-            ParameterError: another end.
+            ParameterError: another end; a drawing that is too large for the format.
             MissingExtraError: matplotlib is not installed.
         """
         path = Path(path)
         ending = path.suffix.removeprefix(".").lower()
         if ending not in FORMATS:
             raise ParameterError(f"A drawing is no '{path.suffix}'. Take .{', .'.join(FORMATS)}.")
+        left, bottom, right, top = self.size
+        longest, limit = max(right - left, top - bottom), LARGEST.get(ending, math.inf)
+        if longest > limit:
+            raise ParameterError(
+                f"The drawing is {longest:.0f} pt long, and a file .{ending} may have {limit:.0f} pt. Save it as .svg "
+                "or .pdf, or choose a width= in draw() that makes it shorter."
+            )
         if ending == "tex":
             path.write_text(self.tikz, encoding="utf-8")
         elif ending == "svg":
@@ -131,7 +143,7 @@ class Drawing:
         title = "".join(sign for sign in self.name if sign.isprintable())
         metadata = {"Title": title, "CreationDate": None} if ending == "pdf" else {}
         with mpl.rc_context({"pdf.fonttype": 42}):
-            self.figure().savefig(stream, format=ending, dpi=200, metadata=metadata)
+            self.figure().savefig(stream, format=ending, dpi=RESOLUTION, metadata=metadata)
         return stream.getvalue()
 
     @cached_property
