@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from shaftwork.core.domains import ROTATION
+from shaftwork.core.domains import ELECTRICAL, ROTATION
 from shaftwork.core.errors import ParameterError
 from shaftwork.drawing.items import Item, plain
 from shaftwork.drawing.layout import SHEET, Box, Placement, Spot
@@ -241,8 +241,10 @@ def _groups(result: Placement, graph: CircuitGraph, *, train: bool) -> Iterator[
             for (x, y), right in result.marks[node]
         )
         yield DrawnGroup(f"node {name}", (*leads, *lines, *dots, *heads), tuple(texts))
-    foot = FRAME if train else EARTH
-    yield DrawnGroup("frame", tuple(stroke for point in result.grounds for stroke in moved(foot, point)))
+    feet = (
+        (point, FRAME if train and graph.domains[node] is not ELECTRICAL else EARTH) for point, node in result.grounds
+    )
+    yield DrawnGroup("frame", tuple(stroke for point, foot in feet for stroke in moved(foot, point)))
     for spot in result.spots:
         yield DrawnGroup(f"part {spot.item.part}", tuple(_symbol(spot)), tuple(_texts(spot)))
     for box in result.boxes:

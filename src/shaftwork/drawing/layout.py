@@ -96,7 +96,7 @@ class Placement:
         wires: by node, lines through points.
         leads: by node, lines to what hangs from it.
         dots: by node, where more than two lines meet.
-        grounds: where the frame or the reference begins.
+        grounds: where the frame or the reference begins, and a node whose domain it is of.
         pins: names of the ends of boxes.
         marks: by node, where its line ends at its name, and whether the name is to the right.
     """
@@ -106,7 +106,7 @@ class Placement:
     wires: dict[End, list[tuple[Point, ...]]] = field(default_factory=lambda: defaultdict(list))
     leads: dict[End, list[tuple[Point, ...]]] = field(default_factory=lambda: defaultdict(list))
     dots: dict[End, list[Point]] = field(default_factory=lambda: defaultdict(list))
-    grounds: list[Point] = field(default_factory=list)
+    grounds: list[tuple[Point, End]] = field(default_factory=list)
     pins: list[Text] = field(default_factory=list)
     marks: dict[End, list[tuple[Point, bool]]] = field(default_factory=lambda: defaultdict(list))
 
@@ -120,7 +120,7 @@ class Placement:
                 mine[node] += [tuple(_up(point, y) for point in line) for line in lines]
         for node, points in other.dots.items():
             self.dots[node] += [_up(point, y) for point in points]
-        self.grounds += [_up(point, y) for point in other.grounds]
+        self.grounds += [(_up(point, y), node) for point, node in other.grounds]
         self.pins += [replace(text, at=_up(text.at, y)) for text in other.pins]
         for node, marks in other.marks.items():
             self.marks[node] += [(_up(point, y), right) for point, right in marks]

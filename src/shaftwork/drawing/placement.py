@@ -207,7 +207,7 @@ class Row:
             mirrored = each.ends[0] == GROUND
             label = (label_x, begin[1] - LENGTH / 2)
             self.result.spots.append(Spot(each, begin, label, turned=True, mirrored=mirrored))
-        self.result.grounds.append(foot)
+        self.result.grounds.append((foot, station.number))
         self.below = max(self.below, SHEET.space - foot[1])
         self.touches[station].append((x + middle, 1))
         self.low = x + width
@@ -233,7 +233,8 @@ class Row:
         self.result.boxes.append(Box(item, x, x + width, 0.0))
         self.above, self.below = max(self.above, SHEET.half), max(self.below, SHEET.half)
         if GROUND in item.ends:
-            self.result.grounds.append((x + width / 2, -SHEET.half))
+            node = next(end for end in item.ends if end != GROUND)
+            self.result.grounds.append(((x + width / 2, -SHEET.half), node))
             self.below = max(self.below, SHEET.half + SHEET.space)
         return x + width
 
