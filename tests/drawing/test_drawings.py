@@ -300,6 +300,36 @@ def test_a_phase_is_drawn_with_contacts_and_its_words() -> None:
     assert words["part load"] == ["load", "stuck"]
 
 
+def test_a_locked_brake_is_a_closed_contact_and_an_open_gap_a_break() -> None:
+    """The line between the rings of a closed contact goes on straight, that of a break is slanted."""
+    drawing = sw.scenes.six_phases().draw(as_circuit=True, phase="brake locked, shaft open, load stuck")
+    lines = {group.name: group.strokes[2] for group in drawing.groups if group.name in ("part brake", "part shaft")}
+    (x1, _), (x2, _) = lines["part brake"].points
+    (_, y1), (_, y2) = lines["part shaft"].points
+    assert x1 == x2  # it hangs
+    assert y1 != y2  # it lies
+
+
+@pytest.mark.parametrize(("words", "touching"), [("locked", True), ("released", False)])
+def test_the_plates_of_a_brake_touch_in_the_drive_train_where_it_is_locked(words: str, touching: bool) -> None:  # noqa: FBT001
+    drawing = sw.scenes.six_phases().draw(phase=f"brake {words}, shaft open, load stuck")
+    (brake,) = [group for group in drawing.groups if group.name == "part brake"]
+    upper, lower = ([y for _, y in stroke.points] for stroke in brake.strokes if stroke.fill is not None)
+    assert (min(upper) == max(lower)) is touching
+
+
+@pytest.mark.parametrize("as_circuit", [False, True])
+@pytest.mark.parametrize("name", [name for name in SCENES if SCENES[name]().start_phase()])
+def test_the_modes_at_the_start_of_a_scene_stand_beside_its_parts(name: str, as_circuit: bool) -> None:  # noqa: FBT001
+    net = SCENES[name]()
+    phase = net.start_phase()
+    groups = {group.name: group for group in net.draw(as_circuit=as_circuit, phase=phase).groups if group.texts}
+    for words in phase.split(", "):
+        part, _, mode = words.partition(" ")
+        if f"part {part}" in groups:  # a machine has several elements with modes of their own
+            assert mode in {text.words for text in groups[f"part {part}"].texts}
+
+
 def test_a_network_that_cannot_be_assembled_has_no_picture_and_an_error_that_says_why() -> None:
     net = sw.Network("torque on nothing")
     net.add(sw.TorqueSource("motor", tau=1.0), "rotor")

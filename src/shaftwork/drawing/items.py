@@ -185,8 +185,17 @@ def train_items(letters: Letters) -> Iterator[Item]:
         ends = tuple(part.nodes[port.name] for port in part.component.ports)
         if set(ends) != {GROUND}:
             shape = train_shape(part, letters.graph)
+            if part.name in letters.modes and _is_closed(part, letters.graph):
+                shape = TRAIN["closed"]
             lines = () if shape is TRAIN["wire"] else tuple(letters.of_part(part))
             yield Item(part.name, shape, ends, lines, names_of(part))
+
+
+def _is_closed(part: GraphPart, graph: CircuitGraph) -> bool:
+    """Whether a part holds its ends together in a phase: rigidly, or as a gap in contact does."""
+    branches = [graph.branches[k] for k in part.branches]
+    rigid = all(branch.template.kind is Kind.COUPLING and len(branch.terms) == 1 for branch in branches)
+    return bool(branches) and (rigid or symbol_of(part) in ("gap", "stop"))
 
 
 def names_of(part: GraphPart) -> dict[End, str]:

@@ -235,6 +235,9 @@ TRAIN: Mapping[str, Shape] = {
         rectangle(MIDDLE + 2.0, -12.0, MIDDLE + 6.0, 12.0, GREY),
         gap=12.0,
     ),
+    "closed": _plates(
+        rectangle(MIDDLE - 6.0, -11.0, MIDDLE, 11.0, GREY), rectangle(MIDDLE, -11.0, MIDDLE + 6.0, 11.0, GREY), gap=12.0
+    ),
     "freewheel": _plates(area((MIDDLE - 6.0, 7.0), (MIDDLE - 6.0, -7.0), (MIDDLE + 6.0, 0.0), fill=WHITE), gap=12.0),
     "gap": _plates(
         *arrow((MIDDLE, 0.0), (MIDDLE - 8.0, 0.0), 4.0), *arrow((MIDDLE, 0.0), (MIDDLE + 8.0, 0.0), 4.0), gap=16.0
