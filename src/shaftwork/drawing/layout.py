@@ -130,7 +130,7 @@ def _up(point: Point, y: float) -> Point:
     return point[0], point[1] + y
 
 
-class Station(NamedTuple):
+class DrawnStation(NamedTuple):
     """What stands in a row.
 
     Args:
@@ -156,8 +156,8 @@ class Joint:
         pin: of a wire to windings, the number of the end.
     """
 
-    first: Station
-    second: Station
+    first: DrawnStation
+    second: DrawnStation
     item: Item | None
     node: End
     pin: int = 0
@@ -182,7 +182,7 @@ class Layout:
     ) -> None:
         self.items, self.width_of, self.name_of, self.width = tuple(items), width_of, name_of, width
         self.shunts: dict[End, list[Item]] = defaultdict(list)
-        self.boxes: dict[Station, Item] = {}
+        self.boxes: dict[DrawnStation, Item] = {}
         self._joints: list[Joint] = []
         for place, item in enumerate(self.items):
             self._sort(place, item)
@@ -190,21 +190,21 @@ class Layout:
     def _sort(self, place: int, item: Item) -> None:
         alive = [end for end in item.ends if end != GROUND]
         if item.windings:
-            box = Station("box", place)
+            box = DrawnStation("box", place)
             self.boxes[box] = item
             pins = [end for winding in item.windings for end in (winding.plus, winding.minus) if end != GROUND]
-            self._joints += [Joint(Station("node", end), box, None, end, pin) for pin, end in enumerate(pins)]
+            self._joints += [Joint(DrawnStation("node", end), box, None, end, pin) for pin, end in enumerate(pins)]
         elif item.below is not None:
             self.shunts[item.ends[0]].append(item)
         elif len(alive) == 1 and len(item.ends) <= 2:
             self.shunts[alive[0]].append(item)
         elif len(item.ends) == 2 and alive[0] != alive[1]:
-            first, second = (Station("node", end) for end in item.ends)
+            first, second = (DrawnStation("node", end) for end in item.ends)
             self._joints.append(Joint(first, second, item, GROUND))
         else:
-            box = Station("box", place)
+            box = DrawnStation("box", place)
             self.boxes[box] = item
-            self._joints += [Joint(Station("node", end), box, None, end) for end in alive]
+            self._joints += [Joint(DrawnStation("node", end), box, None, end) for end in alive]
 
     def text_width(self, item: Item) -> float:
         """Of the widest of its lines, pt."""
@@ -226,19 +226,19 @@ class Layout:
         return middle, label + max(map(self.text_width, column)) + SHEET.space
 
     @cached_property
-    def order(self) -> tuple[Station, ...]:
+    def order(self) -> tuple[DrawnStation, ...]:
         """The stations in the order in which they stand; a node has a piece for each item that hangs from it."""
-        nodes = dict.fromkeys(Station("node", end) for item in self.items for end in _row_ends(item))
+        nodes = dict.fromkeys(DrawnStation("node", end) for item in self.items for end in _row_ends(item))
         whole = in_order((*nodes, *self.boxes), ((joint.first, joint.second) for joint in self._joints))
         return tuple(
             station._replace(piece=piece) for station in whole for piece in range(self._last_piece(station) + 1)
         )
 
-    def _last_piece(self, station: Station) -> int:
+    def _last_piece(self, station: DrawnStation) -> int:
         return max(0, len(self.shunts.get(station.number, ())) - 1) if station.kind == "node" else 0
 
     @cached_property
-    def place(self) -> dict[Station, int]:
+    def place(self) -> dict[DrawnStation, int]:
         """The place of each station in the order."""
         return {station: place for place, station in enumerate(self.order)}
 
@@ -259,9 +259,9 @@ class Layout:
         return tuple(joints)
 
     @cached_property
-    def joints_at(self) -> dict[Station, list[int]]:
+    def joints_at(self) -> dict[DrawnStation, list[int]]:
         """The numbers of the joints that end at each station."""
-        numbers: dict[Station, list[int]] = defaultdict(list)
+        numbers: dict[DrawnStation, list[int]] = defaultdict(list)
         for number, joint in enumerate(self.joints):
             numbers[joint.first].append(number)
             numbers[joint.second].append(number)

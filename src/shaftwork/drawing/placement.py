@@ -8,7 +8,7 @@ from dataclasses import replace
 from operator import attrgetter
 
 from shaftwork.drawing.items import End, Item
-from shaftwork.drawing.layout import SHEET, Box, Joint, Layout, Placement, Spot, Station
+from shaftwork.drawing.layout import SHEET, Box, DrawnStation, Joint, Layout, Placement, Spot
 from shaftwork.drawing.strokes import Point, Text
 from shaftwork.drawing.symbols import LENGTH
 from shaftwork.drawing.windings import DEPTH
@@ -38,11 +38,11 @@ def placed(
     return whole
 
 
-def _row_from(first: int, layout: Layout) -> Row:
+def _row_from(first: int, layout: Layout) -> DrawnRow:
     """The row that begins with a station: the rest if it has room, else up to where the fewest lines lead on."""
-    rows: list[Row] = []
+    rows: list[DrawnRow] = []
     for last in range(first, len(layout.order)):
-        row = Row(layout, first, last)
+        row = DrawnRow(layout, first, last)
         if rows and row.end > layout.width:
             full = [each for each in rows if each.end > FULL * layout.width] or rows[-1:]
             return min(reversed(full), key=attrgetter("leading_on"))
@@ -50,7 +50,7 @@ def _row_from(first: int, layout: Layout) -> Row:
     return rows[-1]
 
 
-class Row:
+class DrawnRow:
     """Stations in a row about its own line y = 0, from left to right: the slots of each, then the gap behind it.
 
     Args:
@@ -75,8 +75,8 @@ class Row:
         self.tracks = self._tracks()
         self.direct = {self.spans[n][0]: n for n, track in enumerate(self.tracks) if track == 0}
         self.home = [(low + high - 1) // 2 for low, high in self.spans]
-        self.leaves: dict[tuple[int, Station], float] = {}
-        self.touches: dict[Station, list[tuple[float, int]]] = defaultdict(list)
+        self.leaves: dict[tuple[int, DrawnStation], float] = {}
+        self.touches: dict[DrawnStation, list[tuple[float, int]]] = defaultdict(list)
         self.gaps: list[tuple[float, float]] = []
         self._place_all()
         self.tops = self._heights()
@@ -84,14 +84,14 @@ class Row:
             self._joint(number)
         self._wires()
 
-    def _cut_out(self) -> tuple[Station, ...]:
+    def _cut_out(self) -> tuple[DrawnStation, ...]:
         """The stations of the row, between the marks of nodes that are in other rows too.
 
         A joint between two nodes is drawn in the later row, a wire from a box to a node in that of the box.
         """
         inside = self.layout.order[self.first : self.last + 1]
-        marks: dict[tuple[End, bool], Station] = {}  # by node and whether it leads on, not back
-        links: dict[tuple[End, bool], Station] = {}  # where lines of this row lead to marks
+        marks: dict[tuple[End, bool], DrawnStation] = {}  # by node and whether it leads on, not back
+        links: dict[tuple[End, bool], DrawnStation] = {}  # where lines of this row lead to marks
         for number in sorted(dict.fromkeys(n for station in inside for n in self.layout.joints_at[station])):
             joint = self.layout.joints[number]
             outer = [end for end in (joint.first, joint.second) if not self._has(end)]
@@ -103,7 +103,7 @@ class Row:
             later = self.layout.place[there] > self.last
             drawn_here = here.kind == "box" or (joint.item is not None and not later)
             node = there.number if drawn_here else here.number
-            mark = marks.setdefault((node, later), Station("mark", node, int(later)))
+            mark = marks.setdefault((node, later), DrawnStation("mark", node, int(later)))
             if drawn_here:
                 ends = (mark, here) if there == joint.first else (here, mark)
                 self.joints.append(replace(joint, first=ends[0], second=ends[1]))
@@ -114,7 +114,7 @@ class Row:
         self.leading_on = len(forth)
         return (*back, *inside, *forth)
 
-    def _has(self, station: Station) -> bool:
+    def _has(self, station: DrawnStation) -> bool:
         return self.first <= self.layout.place[station] <= self.last
 
     def _tracks(self) -> list[int]:
@@ -133,7 +133,7 @@ class Row:
             used[track].append((low, high))
         return tracks
 
-    def _is_wound(self, station: Station) -> bool:
+    def _is_wound(self, station: DrawnStation) -> bool:
         return station.kind == "box" and bool(self.layout.boxes[station].windings)
 
     def _place_all(self) -> None:
@@ -175,7 +175,7 @@ class Row:
             x = self._mark(station, x, right=True)
         return x
 
-    def _mark(self, station: Station, x: float, *, right: bool) -> float:
+    def _mark(self, station: DrawnStation, x: float, *, right: bool) -> float:
         """The end of a line at the name of its node; the end of both."""
         room = self.layout.width_of(self.layout.name_of(station.number)) + SHEET.arrow + 2.0
         at = x if right else x + room
@@ -184,12 +184,12 @@ class Row:
         self.above, self.below = max(self.above, SHEET.line), max(self.below, SHEET.space)
         return x + room
 
-    def _riser(self, number: int, station: Station, x: float) -> float:
+    def _riser(self, number: int, station: DrawnStation, x: float) -> float:
         self.leaves[number, station] = x + SHEET.rise / 2
         self.touches[station].append((x + SHEET.rise / 2, 1))
         return x + SHEET.rise
 
-    def _shunt(self, item: Item, station: Station, x: float) -> float:
+    def _shunt(self, item: Item, station: DrawnStation, x: float) -> float:
         shape, (middle, width) = item.shape, self.layout.shunt(item)
         if shape.on_line:
             self.result.spots.append(Spot(item, (x + middle, 0.0), (x + middle, shape.above + 3.0)))
@@ -238,7 +238,7 @@ class Row:
             self.below = max(self.below, SHEET.half + SHEET.space)
         return x + width
 
-    def _windings(self, item: Item, station: Station, x: float) -> float:
+    def _windings(self, item: Item, station: DrawnStation, x: float) -> float:
         """A transformer, all ends of which rise from the line."""
         core = self.layout.core(item)
         width = max(core.width, self.layout.text_width(item)) + SHEET.space
@@ -300,7 +300,7 @@ class Row:
         label = (x + LENGTH / 2, y + joint.item.shape.above + 3.0)
         self.result.spots.append(Spot(joint.item, (x, y), label, mirrored=left != joint.first))
 
-    def _top_of(self, station: Station) -> float:
+    def _top_of(self, station: DrawnStation) -> float:
         """Where a line that rises from a station begins."""
         return SHEET.half if station.kind == "box" and not self._is_wound(station) else 0.0
 
