@@ -14,6 +14,9 @@ def draw_options(parser: ArgumentParser) -> None:
     parser.add_argument("--dual", action="store_true", help="the dual circuit, force-voltage, instead of it")
     parser.add_argument("--values", action="store_true", help="the values of parameters too")
     parser.add_argument("--phase", metavar="WORDS", help="in one phase, such as 'gap open, load stuck'")
+    parser.add_argument(
+        "--width", metavar="PT", type=float, default=680.0, help="of the drawing; longer rows are broken"
+    )
     parser.add_argument("--expand", action="store_true", help="with long shafts written out part by part")
 
 
@@ -27,6 +30,7 @@ def draw(options: Namespace, say: Say) -> Data:
         values=options.values,
         expand=options.expand,
         phase=options.phase or None,
+        width=options.width,
     )
     drawing.save(options.file)
     say(f"written: {options.file}")

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import io
-import re
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from shaftwork.core.domains import ROTATION
-from shaftwork.core.errors import MissingExtraError, ParameterError
-from shaftwork.drawing.items import Item
+from shaftwork.core.domains import ELECTRICAL, ROTATION
+from shaftwork.core.errors import ParameterError
+from shaftwork.drawing.items import Item, plain
 from shaftwork.drawing.layout import SHEET, Box, Placement, Spot
 from shaftwork.drawing.placement import placed
-from shaftwork.drawing.strokes import THICK, THIN, Stroke, Text, circle, line, moved, rectangle
+from shaftwork.drawing.strokes import THICK, THIN, Stroke, Text, area, circle, line, moved, rectangle
+from shaftwork.drawing.svg import svg_of
 from shaftwork.drawing.symbols import EARTH, FRAME, LENGTH, WHITE
+from shaftwork.drawing.texts import FORMULA, box_of, letters_of, width_of
+from shaftwork.drawing.windings import DEPTH, Core
 from shaftwork.equations.spelling import in_text
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.results.plotting import new_figure
@@ -24,8 +27,13 @@ from shaftwork.results.plotting import new_figure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SIDES = {"left": "left", "centre": "center", "right": "right"}
+MARGIN = 10.0
+"""Around a drawing, pt."""
 FORMATS = ("svg", "pdf", "png", "tex")
+RESOLUTION = 200
+"""Of a picture, pixels per inch."""
+LARGEST = {"png": 2**16 * 72 / RESOLUTION, "tex": 16383.0}
+"""The longest side, pt: pictures have 2^16 pixels, and TeX's lengths end at 2^14 pt."""
 
 
 @dataclass(frozen=True)
@@ -73,8 +81,7 @@ class Drawing:
                 left, bottom, right, top = box_of(text)
                 xs += [left, right]
                 ys += [bottom, top]
-        margin = 10.0  # pt
-        return min(xs) - margin, min(ys) - margin, max(xs) + margin, max(ys) + margin
+        return min(xs) - MARGIN, min(ys) - MARGIN, max(xs) + MARGIN, max(ys) + MARGIN
 
     def figure(self) -> Figure:
         """As a figure of matplotlib, in its own size.
@@ -89,26 +96,43 @@ class Drawing:
         axes.set_axis_off()
         axes.set(xlim=(left, right), ylim=(bottom, top))
         for order, group in enumerate(self.groups):
-            for k, stroke in enumerate(group.strokes):
-                _draw(axes, stroke, f"{order}:{k}:{group.name}", order)
-            for k, text in enumerate(group.texts):
-                style: dict[str, Any] = {"size": text.size, "gid": f"{order}:text {k}:{group.name}", "zorder": order}
-                axes.text(*text.at, text.words, ha=SIDES[text.anchor], va="baseline", **style)
+            for stroke in group.strokes:
+                _draw(axes, stroke, order)
+            for text in group.texts:
+                runs, bars = letters_of(text)
+                for run in runs:
+                    style: dict[str, Any] = {
+                        "family": run.family,
+                        "style": "oblique" if run.slanted else "normal",
+                        "zorder": order,
+                    }
+                    axes.text(run.x, run.y, run.words, size=run.size, parse_math=False, va="baseline", **style)
+                for bar in bars:
+                    _draw(axes, bar, order)
         return figure
 
     def save(self, path: str | Path) -> None:
         """Write it; the format follows from the end of the name: .svg, .pdf, .png, or .tex for TikZ.
 
         Raises:
-            ParameterError: another end.
+            ParameterError: another end; a drawing that is too large for the format.
             MissingExtraError: matplotlib is not installed.
         """
         path = Path(path)
         ending = path.suffix.removeprefix(".").lower()
         if ending not in FORMATS:
             raise ParameterError(f"A drawing is no '{path.suffix}'. Take .{', .'.join(FORMATS)}.")
+        left, bottom, right, top = self.size
+        longest, limit = max(right - left, top - bottom), LARGEST.get(ending, math.inf)
+        if longest > limit:
+            raise ParameterError(
+                f"The drawing is {longest:.0f} pt long, and a file .{ending} may have {limit:.0f} pt. Save it as .svg "
+                "or .pdf, or choose a width= in draw() that makes it shorter."
+            )
         if ending == "tex":
             path.write_text(self.tikz, encoding="utf-8")
+        elif ending == "svg":
+            path.write_text(self.svg, encoding="utf-8")
         else:
             path.write_bytes(self._bytes(ending))
 
@@ -116,17 +140,16 @@ class Drawing:
         import matplotlib as mpl
 
         stream = io.BytesIO()
-        with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": self.name, "pdf.fonttype": 42}):
-            title = "".join(sign for sign in self.name if sign.isprintable())
-            metadata: dict[str, Any] = {"Title": title} if ending != "png" else {}
-            dates = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(ending, {})
-            self.figure().savefig(stream, format=ending, dpi=200, metadata=metadata | dates)
+        title = "".join(sign for sign in self.name if sign.isprintable())
+        metadata = {"Title": title, "CreationDate": None} if ending == "pdf" else {}
+        with mpl.rc_context({"pdf.fonttype": 42}):
+            self.figure().savefig(stream, format=ending, dpi=RESOLUTION, metadata=metadata)
         return stream.getvalue()
 
     @cached_property
     def svg(self) -> str:
         """As SVG; the ids of its groups end with "part J1" or "node rotor" for what they belong to."""
-        return self._bytes("svg").decode()
+        return svg_of(self.name, self.groups, self.size)
 
     @property
     def tikz(self) -> str:
@@ -142,7 +165,7 @@ class Drawing:
         return self.svg[self.svg.index("<svg") :]
 
 
-def _draw(axes: Any, stroke: Stroke, name: str, order: int) -> None:
+def _draw(axes: Any, stroke: Stroke, order: int) -> None:
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path as Curve
     from matplotlib.transforms import Affine2D
@@ -154,7 +177,7 @@ def _draw(axes: Any, stroke: Stroke, name: str, order: int) -> None:
     else:
         curve = Curve([*stroke.points, stroke.points[0]] if stroke.closed else stroke.points, closed=stroke.closed)
     face = "none" if stroke.fill is None else str(stroke.fill)
-    style = {"capstyle": "round", "joinstyle": "round", "gid": name, "zorder": order}
+    style = {"capstyle": "round", "joinstyle": "round", "zorder": order}
     axes.add_patch(PathPatch(curve, facecolor=face, edgecolor="black", linewidth=stroke.width, **style))
 
 
@@ -178,44 +201,26 @@ def _tikz_stroke(stroke: Stroke) -> str:
 
 def _tikz_text(text: Text) -> str:
     anchor = {"left": "base west", "centre": "base", "right": "base east"}[text.anchor]
-    pieces = re.split(r"(?<!\\)\$", text.words)
+    pieces = FORMULA.split(text.words)
     words = "$".join(piece if k % 2 else in_text(piece.replace(r"\$", "$")) for k, piece in enumerate(pieces))
     return rf"\node[anchor={anchor}, inner sep=0pt] at ({text.at[0]:.2f},{text.at[1]:.2f}) {{{words}}};"
 
 
-@lru_cache(maxsize=4096)
-def width_of(words: str, size: float = 10.0) -> float:
-    """The width of a text, pt.
-
-    Raises:
-        MissingExtraError: matplotlib is not installed.
-    """
-    try:
-        from matplotlib.font_manager import FontProperties
-        from matplotlib.textpath import TextToPath
-    except ImportError:
-        raise MissingExtraError("matplotlib", "plot", "Network.draw()") from None
-    formula = re.search(r"(?<!\\)\$", words) is not None
-    shown = words if formula else words.replace(r"\$", "$")
-    return float(TextToPath().get_text_width_height_descent(shown, FontProperties(size=size), formula)[0])
-
-
-def box_of(text: Text) -> tuple[float, float, float, float]:
-    """Left, bottom, right and top of a text, pt."""
-    width = width_of(text.words, text.size)
-    left = text.at[0] - {"left": 0.0, "centre": width / 2, "right": width}[text.anchor]
-    return left, text.at[1] - 0.3 * text.size, left + width, text.at[1] + 0.8 * text.size
-
-
-def drawn(graph: CircuitGraph, items: Sequence[Item], *, train: bool) -> Drawing:
+def drawn(graph: CircuitGraph, items: Sequence[Item], *, train: bool, width: float) -> Drawing:
     """Items as a drawing.
 
     Args:
         graph: of the network.
         items: what is drawn.
         train: thick lines for shafts and hatches for the frame; else a circuit with wires and dots.
+        width: of the drawing, pt; longer rows go on in the next one.
+
+    Raises:
+        ParameterError: a width that is no number above zero.
     """
-    result = placed(items, width_of)
+    if not (isinstance(width, int | float) and width > 0):
+        raise ParameterError(f"width = {width!r} must be a number of points above 0, or math.inf for one row.")
+    result = placed(items, width_of, lambda node: plain(graph.node_name(node)), width - 2 * MARGIN)
     return Drawing(graph.name, tuple(_groups(result, graph, train=train)))
 
 
@@ -226,12 +231,27 @@ def _groups(result: Placement, graph: CircuitGraph, *, train: bool) -> Iterator[
         dots = () if train else (circle(point, 1.8, 0.0) for point in result.dots[node])
         leads = (line(*wire) for wire in result.leads[node])
         lines = (line(*wire, width=width) for wire in wires)
-        yield DrawnGroup(f"node {graph.node_name(node)}", (*leads, *lines, *dots))
-    foot = FRAME if train else EARTH
-    yield DrawnGroup("frame", tuple(stroke for point in result.grounds for stroke in moved(foot, point)))
+        name = graph.node_name(node)
+        begins = [(x if right else x - 5.0, y) for (x, y), right in result.marks[node]]
+        heads = (area((x, y - 3.0), (x, y + 3.0), (x + 5.0, y), fill=0.0) for x, y in begins)
+        texts = (
+            Text((x + SHEET.arrow, y - 3.5), plain(name), "left")
+            if right
+            else Text((x - SHEET.arrow, y - 3.5), plain(name), "right")
+            for (x, y), right in result.marks[node]
+        )
+        yield DrawnGroup(f"node {name}", (*leads, *lines, *dots, *heads), tuple(texts))
+    feet = (
+        (point, FRAME if train and graph.domains[node] is not ELECTRICAL else EARTH) for point, node in result.grounds
+    )
+    yield DrawnGroup("frame", tuple(stroke for point, foot in feet for stroke in moved(foot, point)))
     for spot in result.spots:
         yield DrawnGroup(f"part {spot.item.part}", tuple(_symbol(spot)), tuple(_texts(spot)))
     for box in result.boxes:
+        if box.core is not None:
+            strokes = moved(box.core.strokes, (box.left, box.middle))
+            yield DrawnGroup(f"part {box.item.part}", strokes, tuple(_winding_texts(box, box.core)))
+            continue
         frame = rectangle(box.left, box.middle - SHEET.half, box.right, box.middle + SHEET.half, WHITE)
         yield DrawnGroup(f"part {box.item.part}", (frame,), tuple(_box_texts(box)))
     yield DrawnGroup("ends", (), tuple(result.pins))
@@ -255,6 +275,21 @@ def _texts(spot: Spot) -> Iterator[Text]:
     if item.shape.mark:
         middle = (spot.at[0], spot.at[1] - LENGTH / 2) if spot.turned else (spot.at[0] + LENGTH / 2, spot.at[1])
         yield Text((middle[0], middle[1] - 3.5), item.shape.mark)
+
+
+def _winding_texts(box: Box, core: Core) -> Iterator[Text]:
+    y = box.middle - DEPTH
+    names = [winding.name for winding in box.item.windings]
+    if any(names):
+        y -= SHEET.line
+        yield from (
+            Text((box.left + x, y + 3.0), name, size=SHEET.small)
+            for x, name in zip(core.middles, names, strict=True)
+            if name
+        )
+    for words in box.item.lines:
+        y -= SHEET.line
+        yield Text(((box.left + box.right) / 2, y + 3.0), words)
 
 
 def _box_texts(box: Box) -> Iterator[Text]:

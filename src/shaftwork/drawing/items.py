@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from sympy import Expr
+
 from shaftwork.drawing.symbols import CIRCUIT, TRAIN, Shape
+from shaftwork.drawing.windings import Winding
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart
 from shaftwork.network.kinds import Kind
 
@@ -69,6 +72,7 @@ class Item:
         ends: the nodes that it joins, in the order of its ends.
         lines: of text beside it, with formulas between dollar signs.
         ports: of a part with more than two ends the name of each, by node.
+        windings: of a transformer that is no pair of grounded windings.
         below: what hangs from its second end, and ends at the reference.
     """
 
@@ -77,6 +81,7 @@ class Item:
     ends: tuple[End, ...]
     lines: tuple[str, ...]
     ports: Mapping[End, str] = field(default_factory=dict)
+    windings: tuple[Winding, ...] = ()
     below: Item | None = None
 
 
@@ -163,9 +168,9 @@ def plain(name: str) -> str:
 def _valued(letter: str, value: float, unit: str) -> str:
     """A letter with its number, in at most five digits and with a power of ten where it is very large or small."""
     mantissa, _, exponent = f"{value:.5g}".partition("e")
-    number = mantissa + (rf" \cdot 10^{{{int(exponent)}}}" if exponent else "")
+    number = mantissa.replace("-", "$-$") + (rf" $\cdot\,10^{{{int(exponent)}}}$" if exponent else "")
     shown = "" if unit == "1" else unit.replace("*", " ").replace("^2", "²").replace("^3", "³")
-    return f"${letter} = {number}$ {shown}".strip()
+    return f"${letter}$ = {number} {shown}".strip()
 
 
 def _inverse(unit: str) -> str:
@@ -180,8 +185,17 @@ def train_items(letters: Letters) -> Iterator[Item]:
         ends = tuple(part.nodes[port.name] for port in part.component.ports)
         if set(ends) != {GROUND}:
             shape = train_shape(part, letters.graph)
+            if part.name in letters.modes and _is_closed(part, letters.graph):
+                shape = TRAIN["closed"]
             lines = () if shape is TRAIN["wire"] else tuple(letters.of_part(part))
             yield Item(part.name, shape, ends, lines, names_of(part))
+
+
+def _is_closed(part: GraphPart, graph: CircuitGraph) -> bool:
+    """Whether a part holds its ends together in a phase: rigidly, or as a gap in contact does."""
+    branches = [graph.branches[k] for k in part.branches]
+    rigid = all(branch.template.kind is Kind.COUPLING and len(branch.terms) == 1 for branch in branches)
+    return bool(branches) and (rigid or symbol_of(part) in ("gap", "stop"))
 
 
 def names_of(part: GraphPart) -> dict[End, str]:
@@ -251,25 +265,31 @@ def _elements(branch: GraphBranch, part: GraphPart, letters: Letters) -> Iterato
 
 
 def _coupling(branch: GraphBranch, part: GraphPart, letters: Letters) -> Iterator[Item]:
-    """A transformer for a gear between two nodes, a closed contact for a rigid joint, else a box."""
+    """A closed contact for a rigid joint, else a transformer."""
     terms = [term for term in branch.terms if term[1] != term[2]]
     if len(terms) == 1:
         ground = symbol_of(part) == "wire"
         lines = () if ground else tuple(letters.of_name(part))
         yield Item(part.name, CIRCUIT["wire" if ground else "contact"], terms[0][1:], lines)
-    elif len(terms) == 2 and all(minus == GROUND for _, _, minus in terms):
-        (first, node, _), (second, other, _) = terms
-        values = {
-            symbol: letters.graph.parameters[f"{part.name}.{symbol.name}"] for symbol in (first * second).free_symbols
-        }
-        same = float((first * second).subs(values)) < 0.0
-        shape = CIRCUIT["transformer" if same else "reversing transformer"]
-        yield Item(part.name, shape, (node, other), tuple(letters.of_part(part)))
     elif terms:
-        yield Item(
-            part.name,
-            CIRCUIT["box"],
-            tuple(dict.fromkeys(node for _, *pair in terms for node in pair)),
-            tuple(letters.of_part(part)),
-            names_of(part),
+        windings = tuple(_windings(terms, part, letters.graph))
+        (first, *others), lines = windings, tuple(letters.of_part(part))
+        if len(others) == 1 and all(winding.minus == GROUND for winding in windings):
+            shape = CIRCUIT["transformer" if first.factor != others[0].factor else "reversing transformer"]
+            yield Item(part.name, shape, (first.plus, others[0].plus), lines)
+        else:
+            ends = tuple(dict.fromkeys(node for winding in windings for node in (winding.plus, winding.minus)))
+            yield Item(part.name, CIRCUIT["box"], ends, lines, windings=windings)
+
+
+def _windings(terms: Sequence[tuple[Expr, End, End]], part: GraphPart, graph: CircuitGraph) -> Iterator[Winding]:
+    """A winding for each term of a coupling; one with a grounded end has it last."""
+    ports = {node: plain(port) for port, node in part.nodes.items()} if len(terms) > 2 else {}
+    for factor, plus, minus in terms:
+        values = {symbol: graph.parameters[f"{part.name}.{symbol.name}"] for symbol in factor.free_symbols}
+        sign = 1 if float(factor.subs(values)) > 0.0 else -1
+        yield (
+            Winding(minus, GROUND, -sign, ports.get(minus, ""))
+            if plus == GROUND
+            else Winding(plus, minus, sign, ports.get(plus, "") if minus == GROUND else "")
         )

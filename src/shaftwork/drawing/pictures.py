@@ -27,7 +27,12 @@ def refuse_analogy(analogy: str, *, as_circuit: bool) -> None:
 
 
 def picture(
-    equations: Equations, in_phase: tuple[CircuitGraph, str | NamedPhase] | None, *, as_circuit: bool, values: bool
+    equations: Equations,
+    in_phase: tuple[CircuitGraph, str | NamedPhase] | None,
+    *,
+    as_circuit: bool,
+    values: bool,
+    width: float,
 ) -> Drawing:
     """A drive train or its circuit.
 
@@ -36,13 +41,17 @@ def picture(
         in_phase: where a phase is drawn, the graph of the network and the phase.
         as_circuit: whether it is drawn as a circuit.
         values: whether the values of parameters are written.
+        width: of the drawing, pt.
     """
     modes = {} if in_phase is None else _words_of_modes(*in_phase)
     graph, items = equations.form.graph, circuit_items if as_circuit else train_items
-    return drawn(graph, tuple(items(Letters(graph, equations.symbol_names, values, modes))), train=not as_circuit)
+    letters = Letters(graph, equations.symbol_names, values, modes)
+    return drawn(graph, tuple(items(letters)), train=not as_circuit, width=width)
 
 
-def dual_picture(equations: Equations, dual: CircuitGraph, branches: Mapping[str, int], values: bool) -> Drawing:  # noqa: FBT001
+def dual_picture(
+    equations: Equations, dual: CircuitGraph, branches: Mapping[str, int], *, values: bool, width: float
+) -> Drawing:
     """The dual circuit with the letters of the drive train.
 
     Args:
@@ -50,9 +59,10 @@ def dual_picture(equations: Equations, dual: CircuitGraph, branches: Mapping[str
         dual: the graph of its dual.
         branches: by name of a part of the dual the branch of the network that it is the dual of.
         values: whether the values of parameters are written.
+        width: of the drawing, pt.
     """
     letters = Letters(equations.form.graph, equations.symbol_names, values, {})
-    return drawn(dual, tuple(_dual_items(letters, dual, branches)), train=False)
+    return drawn(dual, tuple(_dual_items(letters, dual, branches)), train=False, width=width)
 
 
 def _words_of_modes(graph: CircuitGraph, phase: str | NamedPhase) -> dict[str, str]:
@@ -71,20 +81,25 @@ def _dual_items(letters: Letters, dual: CircuitGraph, branches: Mapping[str, int
         branches: by name of a part of the dual the branch of the train that it is the dual of.
     """
     items = [
-        replace(item, lines=_lines(letters, item, branches))
+        replace(item, lines=_lines(letters, item, branches, dual))
         for item in circuit_items(Letters(dual, {}, letters.values, {}))
     ]
     yield from _in_columns(items)
 
 
-def _lines(letters: Letters, item: Item, branches: Mapping[str, int]) -> tuple[str, ...]:
-    """The letters of what an item is the dual of; a part that it does not have there has its name."""
+def _lines(letters: Letters, item: Item, branches: Mapping[str, int], dual: CircuitGraph) -> tuple[str, ...]:
+    """The letters of what an item is the dual of; a part that it does not have there has its name.
+
+    A coupling of three speeds is two transformers, whose ratios are no parameters: they are in numbers.
+    """
     if item.part not in branches:
         return item.lines
     branch = letters.graph.branches[branches[item.part]]
     part = letters.graph.parts[branch.part]
     if not branch.terms:
         return tuple(letters.of_branch(branch, part, dual=True))
+    if len(branch.terms) > 2:
+        return *item.lines, f"{dual.parameters[f'{item.part}.ratio']:.5g} : 1"
     lines = tuple(letters.of_part(part))
     letter = lines[0].split(" = ")[0].strip("$") if lines else ""
     return (f"$1/{letter}$", *(line for line in lines if " = " in line)) if letter else lines

@@ -89,7 +89,7 @@ def _mirrored(shape: Shape) -> Shape:
     return replace(shape, strokes=tuple(stroke.mirrored(LENGTH) for stroke in shape.strokes))
 
 
-def _coil(start: Point, along: Point, turns: int, radius: float, side: int) -> tuple[Stroke, ...]:
+def coil(start: Point, along: Point, turns: int, radius: float, side: int) -> tuple[Stroke, ...]:
     """Half circles in a row."""
     strokes = []
     for k in range(turns):
@@ -107,8 +107,8 @@ def _transformer(*, reversing: bool = False) -> Shape:
     strokes: list[Stroke] = [
         line((0.0, 0.0), (left, 0.0), (left, top)),
         line((LENGTH, 0.0), (right, 0.0), (right, top)),
-        *_coil((left, top), (0.0, -1.0), 3, radius, 1),
-        *_coil((right, top), (0.0, -1.0), 3, radius, -1),
+        *coil((left, top), (0.0, -1.0), 3, radius, 1),
+        *coil((right, top), (0.0, -1.0), 3, radius, -1),
         line((MIDDLE - 1.5, top), (MIDDLE - 1.5, foot)),
         line((MIDDLE + 1.5, top), (MIDDLE + 1.5, foot)),
         circle((left - 4, top - 1), 1.2, 0.0),
@@ -137,7 +137,7 @@ _NONLINEAR = line((MIDDLE - 12.0, -11.0), (MIDDLE - 7.0, -11.0), (MIDDLE + 12.0,
 
 CIRCUIT: Mapping[str, Shape] = {
     "capacitor": _plates(gap=5.0),
-    "inductor": Shape((*_leads(11.0, 43.0), *_coil((11.0, 0.0), (1.0, 0.0), 4, 4.0, 1)), 6.0, 4.0),
+    "inductor": Shape((*_leads(11.0, 43.0), *coil((11.0, 0.0), (1.0, 0.0), 4, 4.0, 1)), 6.0, 4.0),
     "resistor": _box(half=14.0, height=5.5),
     "nonlinear": Shape((*_box(half=14.0, height=5.5).strokes, _NONLINEAR), 12.0, 12.0),
     "current": _round("", *arrow((MIDDLE + 8.0, 0.0), (MIDDLE - 8.0, 0.0))),
@@ -146,11 +146,11 @@ CIRCUIT: Mapping[str, Shape] = {
     "reversing transformer": _transformer(reversing=True),
     "wire": Shape((line((0.0, 0.0), (LENGTH, 0.0)),), 2.0, 2.0),
     "nonlinear inductor": Shape(
-        (*_leads(11.0, 43.0), *_coil((11.0, 0.0), (1.0, 0.0), 4, 4.0, 1), _NONLINEAR), 12.0, 12.0
+        (*_leads(11.0, 43.0), *coil((11.0, 0.0), (1.0, 0.0), 4, 4.0, 1), _NONLINEAR), 12.0, 12.0
     ),
     "line": Shape(
         (
-            *_leads(10.0, 44.0),
+            *_leads(4.0, 44.0),
             line((10.0, 6.0), (44.0, 6.0)),
             line((10.0, -6.0), (44.0, -6.0)),
             Stroke(((10.0, 0.0),), radius=6.0, angles=(90.0, 270.0)),
@@ -234,6 +234,9 @@ TRAIN: Mapping[str, Shape] = {
         rectangle(MIDDLE - 6.0, -12.0, MIDDLE - 2.0, 12.0, GREY),
         rectangle(MIDDLE + 2.0, -12.0, MIDDLE + 6.0, 12.0, GREY),
         gap=12.0,
+    ),
+    "closed": _plates(
+        rectangle(MIDDLE - 6.0, -11.0, MIDDLE, 11.0, GREY), rectangle(MIDDLE, -11.0, MIDDLE + 6.0, 11.0, GREY), gap=12.0
     ),
     "freewheel": _plates(area((MIDDLE - 6.0, 7.0), (MIDDLE - 6.0, -7.0), (MIDDLE + 6.0, 0.0), fill=WHITE), gap=12.0),
     "gap": _plates(

@@ -113,10 +113,12 @@ class Network(NetworkBuilder):
         Args:
             expand: of the network with its shafts written out part by part.
             phase: a phase of the motion, as for `equations`.
+            width: of the drawing, pt, with letters of 10 pt. A longer row goes on in the next one, behind the name of
+                the node at the end of both.
 
         Raises:
             NetworkError: the network cannot be assembled; lists every reason.
-            ParameterError: as for `equations`.
+            ParameterError: as for `equations`; a width that is not above zero.
         """
         from shaftwork.lagrange.lagrange import lagrangian
 
@@ -297,6 +299,7 @@ class Network(NetworkBuilder):
         values: bool = False,
         expand: bool = False,
         phase: str | NamedPhase | None = None,
+        width: float = 680.0,
     ) -> Drawing:
         """The network as a drawing, placed without hints: shown in notebooks, `save` writes SVG, PDF, PNG and TikZ.
 
@@ -308,10 +311,12 @@ class Network(NetworkBuilder):
             values: the values of parameters below their letters.
             expand: of the network with its shafts written out part by part.
             phase: a phase of the motion, as for `equations`.
+            width: of the drawing, pt, with letters of 10 pt. A longer row goes on in the next one, behind the name of
+                the node at the end of both.
 
         Raises:
             NetworkError: the network cannot be assembled; lists every reason.
-            ParameterError: as for `equations`.
+            ParameterError: as for `equations`; a width that is not above zero.
             MissingExtraError: matplotlib is not installed.
         """
         from shaftwork.drawing.pictures import dual_picture, picture, refuse_analogy
@@ -319,10 +324,11 @@ class Network(NetworkBuilder):
         refuse_analogy(analogy, as_circuit=as_circuit)
         if analogy == "force-voltage":
             dual, equations = self.dual(), self.equations(expand=True, phase=phase)
-            return dual_picture(equations, dual.graph(), {} if dual.analogy is None else dual.analogy.branches, values)
+            branches = {} if dual.analogy is None else dual.analogy.branches
+            return dual_picture(equations, dual.graph(), branches, values=values, width=width)
         equations = self.equations(expand=expand, phase=phase)
         in_phase = None if phase is None else (self.graph(), phase)
-        return picture(equations, in_phase, as_circuit=as_circuit, values=values)
+        return picture(equations, in_phase, as_circuit=as_circuit, values=values, width=width)
 
     def _repr_html_(self) -> str | None:
         """What a notebook shows; nothing but the text where the network cannot be drawn, or is too large to be read."""
