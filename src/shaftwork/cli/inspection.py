@@ -61,6 +61,7 @@ def latex_options(parser: ArgumentParser) -> None:
 @command("print the equations as LaTeX", latex_options)
 def latex(options: Namespace, say: Say) -> Data:
     """The equations of a phase: of those that the source of a scene has, or of the one in which the motion begins."""
+    from shaftwork.equations.spelling import in_text
     from shaftwork.latex.document import joined
 
     net, scene = load(options)
@@ -72,7 +73,7 @@ def latex(options: Namespace, say: Say) -> Data:
         return {}
     for phase, text in zip(phases, texts, strict=True):
         if len(phases) > 1:
-            say(rf"\section*{{{phase}}}")
+            say(rf"\section*{{{in_text(phase)}}}")
         say(text)
     return {}
 

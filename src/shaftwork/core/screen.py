@@ -11,6 +11,10 @@ from typing import Any
 
 LINES, COLUMNS = 25, 100
 """Size of the screen."""
+MOST_SIGNALS = 8
+"""States that are drawn when nobody chooses."""
+MOST_MODES = 30
+"""Modes in a table, the lowest."""
 Show = Callable[[float, str], None]
 """Told how much is done, and a word or two on it."""
 FORMAT = "{desc}: {percentage:3.0f}%|{bar}| {n:.4g} of {total:.4g} {unit} [{elapsed}<{remaining}]"

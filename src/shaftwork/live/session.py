@@ -16,6 +16,7 @@ import numpy as np
 
 from shaftwork.core.errors import ShaftworkError, SimulationError
 from shaftwork.core.notices import FILTERS
+from shaftwork.core.screen import MOST_MODES, MOST_SIGNALS
 from shaftwork.frequency.exact_networks import exact_shafts
 from shaftwork.frequency.natural_modes import Modes
 from shaftwork.live.page_requests import checked
@@ -30,10 +31,6 @@ from shaftwork.scenes.catalog import Scene
 
 POINTS = 600
 """Output times of a motion: as many as a plot on a screen has room for."""
-MOST_SIGNALS = 8
-"""States drawn when nobody chooses."""
-MOST_MODES = 30
-"""Modes in the table, the lowest."""
 END = 10.0
 """End of the motion of a network without a scene, s."""
 

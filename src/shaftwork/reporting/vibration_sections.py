@@ -2,68 +2,61 @@
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from shaftwork.core.errors import ShaftworkError
+from shaftwork.core.screen import MOST_MODES
 from shaftwork.equations.spelling import in_text
 from shaftwork.latex.nomenclature import breakable
 from shaftwork.reporting.latex_parts import columns, listed, number, paragraphs, picture
-
-if TYPE_CHECKING:
-    from shaftwork.reporting.subject import Subject
+from shaftwork.reporting.subject import Section, Subject
+from shaftwork.results.observer import RPM
 
 HOLZER_MODES = 3
 """Modes in tables of their own, the lowest."""
-MOST_MODES = 30
-"""Modes in the table, the lowest."""
 
 
-def frequencies(subject: Subject) -> str:
+def frequencies(subject: Subject) -> Section:
     """Natural frequencies, damping and shapes about the point of the report."""
     try:
         modes = subject.network.modes(subject.at)
     except ShaftworkError as reason:
-        subject.notes.append(f"Natural frequencies are left out: {reason}")
-        return ""
+        return Section(notes=(f"Natural frequencies are left out: {reason}",))
     rows = [
         (in_text(name), number(f), number(60 * f), number(damping, 4), in_text(node))
         for name, f, damping, _, node in modes.table[:MOST_MODES]
     ]
     more = f"The {MOST_MODES} lowest of {len(modes)} modes." if len(modes) > MOST_MODES else ""
-    shapes = ""
-    if (modes.rates.imag > 0).any():
-        subject.figures["modes"] = modes.plot()
-        shapes = picture("modes", "Speeds of the nodes in the lowest modes")
+    swings = bool((modes.rates.imag > 0).any())
+    shapes = picture("modes", "Speeds of the nodes in the lowest modes") if swings else ""
     heads = ("Mode", "Frequency in Hz", "in 1/min", "Damping ratio", "Moves most")
-    return paragraphs(in_text(f"{modes.title}."), in_text(more), columns(heads, rows, (4, 3, 3, 3, 3)), shapes)
+    text = paragraphs(in_text(f"{modes.title}."), in_text(more), columns(heads, rows, (4, 3, 3, 3, 3)), shapes)
+    return Section(text, {"modes": modes.plot()} if swings else {})
 
 
-def campbell(subject: Subject) -> str:
+def campbell(subject: Subject) -> Section:
     """Natural frequencies and orders over the speed, and where they meet."""
     if not len(subject.speeds):
-        return ""
+        return Section()
     try:
         diagram = subject.network.campbell(subject.speeds, subject.orders, at=subject.at)
     except ShaftworkError as reason:
-        subject.notes.append(f"The Campbell diagram is left out: {reason}")
-        return ""
-    subject.figures["campbell"] = diagram.plot()
+        return Section(notes=(f"The Campbell diagram is left out: {reason}",))
     rows = [
-        (number(one.speed * 30 / math.pi), number(one.order), number(one.frequency), in_text(one.mode))
+        (number(one.speed * RPM), number(one.order), number(one.frequency), in_text(one.mode))
         for one in diagram.crossings
     ]
     heads = ("Speed in 1/min", "Order", "Frequency in Hz", "Mode")
-    return paragraphs(picture("campbell", "Campbell diagram"), columns(heads, rows, (2, 1, 2, 3)))
+    text = paragraphs(picture("campbell", "Campbell diagram"), columns(heads, rows, (2, 1, 2, 3)))
+    return Section(text, {"campbell": diagram.plot()})
 
 
-def torsional(subject: Subject) -> str:
+def torsional(subject: Subject) -> Section:
     """The torsional calculation: vibratory torques and stresses with their limits, barred speeds, modes, heat."""
     calculation = subject.torsional
     if calculation is None:
-        return ""
+        return Section()
     judged = [name for name, shaft in calculation.items() if shaft.limits is not None]
-    subject.figures["torsional"] = calculation.plot(*judged)
     rows = [
         tuple(in_text(cell).replace(r"$\mathrm{tau\_c}$", r"$\tau_c$") for cell in row) for row in calculation.table
     ]
@@ -73,7 +66,7 @@ def torsional(subject: Subject) -> str:
         "The torque is half of peak to peak over a cycle, from all orders with their phases. Stresses are nominal; "
         "permitted ones are those of IACS UR M68."
     )
-    return paragraphs(
+    text = paragraphs(
         in_text(f"{calculation.heading}. {rule}"),
         columns(heads, rows, (4, 2.5, 2.5, 1.6, 2.5, 2, 4)),
         listed(barred),
@@ -81,6 +74,7 @@ def torsional(subject: Subject) -> str:
         *map(_holzer, calculation.modes[:HOLZER_MODES]),
         _heat(calculation),
     )
+    return Section(text, {"torsional": calculation.plot(*judged)})
 
 
 def _holzer(mode: Any) -> str:
@@ -106,12 +100,11 @@ def _heat(calculation: Any) -> str:
     return columns(("Heat of the vibration in", "W, at most"), rows, (3, 2))
 
 
-def shaft_models(subject: Subject) -> str:
+def shaft_models(subject: Subject) -> Section:
     """Error and run time of models of a shaft."""
     compared = subject.comparison
     if compared is None:
-        return ""
-    subject.figures["shaft-models"] = compared.plot()
+        return Section()
     rows = [
         (
             breakable(trial.model),
@@ -124,8 +117,9 @@ def shaft_models(subject: Subject) -> str:
     ]
     said = f"Errors of the shaft {compared.shaft} are relative to {compared.truth[0]}."
     heads = ("Model", "Engine", "States", "CPU ms", "Largest error")
-    return paragraphs(
+    text = paragraphs(
         in_text(said),
         picture("shaft-models", "Error of models of the shaft against their run time"),
         columns(heads, rows, (3, 2, 2, 2, 2)),
     )
+    return Section(text, {"shaft-models": compared.plot()})
