@@ -29,6 +29,7 @@ COMMANDS: tuple[Command, ...] = (
     live.open_page,
     frequencies.modes,
     frequencies.campbell,
+    frequencies.torsional,
     studies.sweep,
     studies.compare,
     inspection.export,

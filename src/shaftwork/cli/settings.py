@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from shaftwork.components.base import Component
     from shaftwork.core.parameters import Parameter
     from shaftwork.pipeline.network import Network
+    from shaftwork.results.observer import Array
 
 Item = TypeVar("Item")
 
@@ -97,6 +98,34 @@ def varied(net: Network, texts: Iterable[str], settings: Iterable[str]) -> dict[
         if name in values:
             raise ParameterError(f"--vary gives '{name}' its values, so --set {name}=... has no effect. Leave it out.")
     return values
+
+
+def speeds_in(text: str) -> Array:
+    """(k,) speeds in rad/s, written in 1/min as first:last:count or with commas between them.
+
+    Raises:
+        ParameterError: they are none.
+    """
+    import numpy as np
+
+    from shaftwork.results.observer import RPM
+
+    most = 100_000  # more is a typing error
+    ends = text.split(":")
+    try:
+        if len(ends) == 1:
+            n = np.array([float(speed) for speed in text.split(",")])
+        else:
+            first, last, count = float(ends[0]), float(ends[1]), int(ends[2])
+            n = np.linspace(first, last, count if len(ends) == 3 and 2 <= count <= most else -1)
+        if not ((n >= 0) & np.isfinite(n)).all():
+            raise ValueError
+    except (ValueError, IndexError):
+        raise ParameterError(
+            f"--speeds {text}: write first:last:count in 1/min, such as 300:900:61 with a count from 2 to {most}, or "
+            "speeds with commas between them."
+        ) from None
+    return np.asarray(n / RPM)
 
 
 def follows_speed(text: str) -> bool:

@@ -114,7 +114,7 @@ def parameters(
 def _parameter_letters(phases: Sequence[Equations], used: Sequence[Container[str]]) -> Iterator[tuple[Letter, str]]:
     """Parameters that have an effect, each under every letter that it is printed with."""
     printed: dict[str, list[str]] = {}
-    for equations, names in zip_longest(phases, used, fillvalue=()):
+    for equations, names in zip(phases, used, strict=False):
         for letter in equations.letters:
             if letter.parameter and letter.name in names:
                 printed.setdefault(letter.name, []).append(equations.symbol_names[letter.name])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, TypedDict
+from typing import Any, TypedDict, cast
 
 from shaftwork.core.errors import ParameterError
 from shaftwork.numerics.tolerances import TYPED
@@ -79,7 +79,7 @@ def checked(contents: Contents) -> Contents:
         raise ParameterError(f"sn = {wrong[0]!r} must be an S-N line, sw.SNLine(...), or by quantity one for each.")
     if "origins" in result and not isinstance(result["origins"], Mapping):
         raise ParameterError(f"origins = {result['origins']!r} must say by part, {{'J1': 'drawing 4711'}}.")
-    return Contents(**result)  # type: ignore[typeddict-item]
+    return cast("Contents", result)
 
 
 def _numbers(name: str, values: Any, unit: str) -> Array:
