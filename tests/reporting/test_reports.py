@@ -24,7 +24,14 @@ from tests.latex.test_equations_in_print import compile_latex, compiles, overful
 CHROMIUM = shutil.which("chromium")
 LOADED = re.compile(r"""<(?:script|link|img|iframe)[^>]+(?:src|href)=["'](?!data:|#)""")
 HEADINGS = [
-    *("Introduction", "Drive train and circuit", "Parts and values", "Assumptions", "Equations", "Initial conditions"),
+    *(
+        "Introduction",
+        "Drive train and circuit",
+        "Parts and values",
+        "Assumptions",
+        "Equations",
+        "Initial and operating conditions",
+    ),
     *("Natural frequencies", "Motion", "Extremes", "Energy balance and accuracy", "Load cycles and life"),
     *("Nomenclature", "References", "Model file"),
 ]

@@ -22,7 +22,7 @@ from shaftwork.cli.command import (
 from shaftwork.cli.folder import Folder
 from shaftwork.cli.frequencies import calculation_of, calculation_options, orders_option
 from shaftwork.cli.run import motion_of
-from shaftwork.cli.settings import named, once, speeds_in
+from shaftwork.cli.settings import named, once, point, speeds_in
 from shaftwork.core.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -57,6 +57,10 @@ def report_options(parser: ArgumentParser) -> None:
     )
     origins = 'where the values of a part or parameter come from, as in "J1=drawing 4711"; as often as needed'
     parser.add_argument("--origins", metavar="NAME=WORDS", action="append", default=[], help=origins)
+    about = (
+        "a speed, twist or torque of the point about which frequencies are computed: J1.omega=8.5; as often as needed"
+    )
+    parser.add_argument("--at", metavar="NAME=X", action="append", default=[], help=about)
     orders_option(parser)
     torsional = "the torsional calculation over --speeds; without it these make a Campbell diagram alone"
     parser.add_argument("--torsional", action="store_true", help=torsional)
@@ -123,6 +127,8 @@ def _contents(options: Namespace, net: Network) -> dict[str, Any]:
     contents: dict[str, Any] = {}
     if options.origins:
         contents["origins"] = once("--origins", (named(text, "--origins", "'J1=drawing'") for text in options.origins))
+    if options.at:
+        contents["at"] = point(options.at)
     if options.speeds is not None:
         contents |= {"speeds": speeds_in(options.speeds), "orders": options.orders}
     if options.torsional:

@@ -24,22 +24,33 @@ CURVES = 4
 """Quantities in a picture, which is then no higher than a page."""
 ROWS = 20
 """Phases listed of the beginning, and as many of the end, of a motion that has more."""
+MOST_STATES = 40
+"""Quantities whose start and end are listed."""
 MOST_CYCLES = 6
 """Quantities whose load cycles are counted."""
 
 
 def conditions(subject: Subject) -> Section:
-    """Where the motion starts and how long it lasts."""
+    """Where the motion starts, in which modes, how long it lasts, and where it ends."""
     solution = subject.solution
     if solution is None:
         return Section()
     start, end = solution.steps[0], solution.steps[-1]
-    named = ((name, value) for name, value in solution.initial.items() if isinstance(value, float) and value)
-    rows = [(breakable(name), number(value), unit(solution.observer.units.get(name, ""))) for name, value in named]
-    begins = "The motion starts with the values below." if rows else "The motion starts at rest."
-    lasts = f"It is computed from {start:g} s to {end:g} s."
-    table = columns(("Quantity", "Start value", "Unit"), rows, (3, 2, 2))
-    return Section(paragraphs(in_text(f"{begins} {lasts}"), table))
+    names = [name for name in dict.fromkeys((*solution.initial, *solution.states)) if name in solution]
+    courses = [(name, solution[name]) for name in names[:MOST_STATES]]
+    rows = [
+        (breakable(name), number(course[0]), number(course[-1]), unit(solution.reader.unit(name)))
+        for name, course in courses
+        if course.ndim == 1
+    ]
+    begins = "with the values below" if any(course[0].any() for _, course in courses) else "at rest"
+    modes = f", in the modes: {solution.phases[0].name}" if solution.phases else ""
+    said = [f"The motion starts {begins}{modes}.", f"It is computed from {start:g} s to {end:g} s."]
+    if len(names) > MOST_STATES:
+        said.append(f"The first {MOST_STATES} of {len(names)} quantities that say where it starts are listed.")
+    said.append("What drives and loads it over time stands among the values and laws of the parts.")
+    heads = ("Quantity", "At the start", "At the end", "Unit")
+    return Section(paragraphs(in_text(" ".join(said)), columns(heads, rows, (4, 2, 2, 2))))
 
 
 def motion(subject: Subject) -> Section:
@@ -80,8 +91,7 @@ def extremes(subject: Subject) -> Section:
         return Section()
     names = dict.fromkeys((*subject.signals, *twisted(solution.reader)))
     rows = []
-    for name in names:
-        least, most, mean, end = solution.extremes.row(name)
+    for name, (least, most, mean, end) in solution.extremes.rows(tuple(names)).items():
         values = (number(least), number(least.t, 4), number(most), number(most.t, 4), number(mean), number(end))
         part, _, quantity = name.rpartition(".")
         rows.append((rf"{breakable(part)}.\allowbreak {breakable(quantity)} in {unit(least.unit)}", *values))

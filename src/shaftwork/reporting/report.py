@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.metadata import version
@@ -29,6 +29,7 @@ from shaftwork.reporting.report_arguments import (
 from shaftwork.reporting.subject import Section, Subject
 from shaftwork.reporting.words import as_latex, read
 from shaftwork.reporting.writers import html_page, write_latex, write_pdf
+from shaftwork.results.fatigue import twisted
 from shaftwork.results.solution import Solution
 from shaftwork.scenes.catalog import LITERATURE, Scene
 
@@ -40,7 +41,7 @@ SECTIONS: Mapping[str, tuple[str, Callable[[Subject], Section]]] = {
     "parts": ("Parts and values", network_sections.parts),
     "assumptions": ("Assumptions", lambda subject: network_sections.assumptions(subject, ())),
     "equations": ("Equations", network_sections.equations),
-    "conditions": ("Initial conditions", motion_sections.conditions),
+    "conditions": ("Initial and operating conditions", motion_sections.conditions),
     "frequencies": ("Natural frequencies", vibration_sections.frequencies),
     "campbell": ("Campbell diagram", vibration_sections.campbell),
     "torsional": ("Torsional vibration", vibration_sections.torsional),
@@ -50,7 +51,7 @@ SECTIONS: Mapping[str, tuple[str, Callable[[Subject], Section]]] = {
     "cycles": ("Load cycles and life", motion_sections.cycles),
     "shaft models": ("Models of the shaft compared", vibration_sections.shaft_models),
     "nomenclature": ("Nomenclature", network_sections.nomenclature),
-    "references": ("References", lambda subject: Section(listed(subject.references))),
+    "references": ("References", lambda subject: Section(listed((*subject.references, *_standards(subject))))),
     "model file": ("Model file", network_sections.model_file),
 }
 """What a report can have, in its order, each with its heading."""
@@ -65,6 +66,12 @@ HEAD = rf"""{PREAMBLE.replace("margin=25mm", "margin=22mm")}
 \usepackage{{calc}}
 \usepackage[hidelinks]{{hyperref}}
 \providecommand{{\tightlist}}{{\setlength{{\itemsep}}{{0pt}}\setlength{{\parskip}}{{0pt}}}}"""
+STANDARDS = {
+    "rainflow": "ASTM E1049-85: Standard practices for cycle counting in fatigue analysis. ASTM International",
+    "torsional": "IACS UR M68: Dimensions of propulsion shafts and their permissible torsional vibration stresses. "
+    "International Association of Classification Societies",
+}
+"""What counts load cycles, and what permits stresses of shafts."""
 FORMATS = ("pdf", "html", "tex")
 
 
@@ -273,6 +280,14 @@ def _written(about: Subject, words: Mapping[str, tuple[str, Path]], wanted: Sequ
     if WRITTEN_LAST not in wanted:
         sections["Left out"] = Section(listed(dict.fromkeys(notes)))
     return {heading: section for heading, section in sections.items() if section.text}
+
+
+def _standards(subject: Subject) -> Iterator[str]:
+    """Rules and methods that sections refer to."""
+    if subject.solution is not None and twisted(subject.solution.reader):
+        yield STANDARDS["rainflow"]
+    if subject.torsional is not None:
+        yield STANDARDS["torsional"]
 
 
 def _joined(words: Section, section: Section) -> Section:

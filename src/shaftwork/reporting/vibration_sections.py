@@ -39,7 +39,10 @@ def campbell(subject: Subject) -> Section:
     if not len(subject.speeds):
         return Section()
     try:
-        diagram = subject.network.campbell(subject.speeds, subject.orders, at=subject.at)
+        if subject.torsional is not None:  # it knows the point of each speed
+            diagram = subject.torsional.campbell(subject.orders)
+        else:
+            diagram = subject.network.campbell(subject.speeds, subject.orders, at=subject.at)
     except ShaftworkError as reason:
         return Section(notes=(f"The Campbell diagram is left out: {reason}",))
     rows = [
