@@ -65,6 +65,14 @@ HEAD = rf"""{PREAMBLE.replace("margin=25mm", "margin=22mm")}
 \usepackage{{graphicx}}
 \usepackage{{calc}}
 \usepackage[hidelinks]{{hyperref}}
+% a section and a table begin where some rows have room
+\makeatletter
+\newcommand{{\roomfor}}[1]{{\par\if@nobreak\else\ifdim\dimexpr\pagegoal-\pagetotal<#1\relax\newpage\fi\fi}}
+\ifdefined\AddToHook
+\AddToHook{{env/longtable/before}}{{\roomfor{{35mm}}}}
+\AddToHook{{cmd/section/before}}{{\roomfor{{50mm}}}}
+\fi
+\makeatother
 \providecommand{{\tightlist}}{{\setlength{{\itemsep}}{{0pt}}\setlength{{\parskip}}{{0pt}}}}"""
 STANDARDS = {
     "rainflow": "ASTM E1049-85: Standard practices for cycle counting in fatigue analysis. ASTM International",
