@@ -12,7 +12,7 @@ from shaftwork.core.screen import counted
 from shaftwork.equations.spelling import in_text
 from shaftwork.latex.nomenclature import breakable, unit
 from shaftwork.reporting.latex_parts import columns, listed, number, paragraphs, picture
-from shaftwork.reporting.subject import Section, Subject
+from shaftwork.reporting.subject import ReportSection, Subject
 from shaftwork.results.fatigue import SNLine, twisted
 
 if TYPE_CHECKING:
@@ -30,11 +30,11 @@ MOST_CYCLES = 6
 """Quantities whose load cycles are counted."""
 
 
-def conditions(subject: Subject) -> Section:
+def conditions(subject: Subject) -> ReportSection:
     """Where the motion starts, in which modes, how long it lasts, and where it ends."""
     solution = subject.solution
     if solution is None:
-        return Section()
+        return ReportSection()
     start, end = solution.steps[0], solution.steps[-1]
     names = [name for name in dict.fromkeys((*solution.initial, *solution.states)) if name in solution]
     courses = [(name, solution[name]) for name in names[:MOST_STATES]]
@@ -50,14 +50,14 @@ def conditions(subject: Subject) -> Section:
         said.append(f"The first {MOST_STATES} of {len(names)} quantities that say where it starts are listed.")
     said.append("What drives and loads it over time stands among the values and laws of the parts.")
     heads = ("Quantity", "At the start", "At the end", "Unit")
-    return Section(paragraphs(in_text(" ".join(said)), columns(heads, rows, (4, 2, 2, 2))))
+    return ReportSection(paragraphs(in_text(" ".join(said)), columns(heads, rows, (4, 2, 2, 2))))
 
 
-def motion(subject: Subject) -> Section:
+def motion(subject: Subject) -> ReportSection:
     """Curves of the signals, and the phases of the motion."""
     solution = subject.solution
     if solution is None or not subject.signals:
-        return Section()
+        return ReportSection()
     pictures: list[str] = []
     figures: dict[str, Figure] = {}
     curves: dict[str, tuple[str, ...]] = {}
@@ -69,7 +69,7 @@ def motion(subject: Subject) -> Section:
         label = f"motion-{place + 1}"
         figures[label], curves[label] = solution.plot(*names), names
         pictures.append(picture(label, f"{', '.join(names)} over time"))
-    return Section(paragraphs(*pictures, _phases(solution)), figures, curves)
+    return ReportSection(paragraphs(*pictures, _phases(solution)), figures, curves)
 
 
 def _phases(solution: Solution) -> str:
@@ -84,11 +84,11 @@ def _phases(solution: Solution) -> str:
     return paragraphs(in_text(events), columns(("From s", "To s", "Phase"), cells, (1, 1, 6)))
 
 
-def extremes(subject: Subject) -> Section:
+def extremes(subject: Subject) -> ReportSection:
     """The true extremes of the signals and of all that is twisted, found between the output times too."""
     solution = subject.solution
     if solution is None:
-        return Section()
+        return ReportSection()
     names = dict.fromkeys((*subject.signals, *twisted(solution.reader)))
     rows = []
     for name, (least, most, mean, end) in solution.extremes.rows(tuple(names)).items():
@@ -97,14 +97,14 @@ def extremes(subject: Subject) -> Section:
         rows.append((rf"{breakable(part)}.\allowbreak {breakable(quantity)} in {unit(least.unit)}", *values))
     said = "Extremes are those of the motion itself, searched between the output times, on both sides of every jump."
     heads = ("Quantity", "Minimum", "at s", "Maximum", "at s", "Mean", "End")
-    return Section(paragraphs(in_text(said), columns(heads, rows, (4.4, 4.25, 3.1, 4.25, 3.1, 4.15, 4.15))))
+    return ReportSection(paragraphs(in_text(said), columns(heads, rows, (4.4, 4.25, 3.1, 4.25, 3.1, 4.15, 4.15))))
 
 
-def energy(subject: Subject) -> Section:
+def energy(subject: Subject) -> ReportSection:
     """Who supplies and who loses energy, how much is left over, and how accurately was integrated."""
     solution = subject.solution
     if solution is None:
-        return Section()
+        return ReportSection()
     balance = solution.energy
     rows = [("supplied by", breakable(part), number(value)) for part, value in balance.supplied_by.items() if value]
     rows += [("lost in", breakable(part), number(value)) for part, value in balance.lost_in.items() if value]
@@ -114,21 +114,21 @@ def energy(subject: Subject) -> Section:
         f"{solution.rtol:g}. What is supplied less what is lost and stored is {balance.residual:.1e} of the work done "
         "at most; it measures the error of the integration without a reference."
     )
-    return Section(paragraphs(columns(("Energy", "Part", "J"), rows, (2, 4, 2)), in_text(said)))
+    return ReportSection(paragraphs(columns(("Energy", "Part", "J"), rows, (2, 4, 2)), in_text(said)))
 
 
-def cycles(subject: Subject) -> Section:
+def cycles(subject: Subject) -> ReportSection:
     """Load cycles of what is twisted, and the damage by its S-N line."""
     solution = subject.solution
     there = twisted(solution.reader) if solution else ()
     if solution is None or not there:
-        return Section()
+        return ReportSection()
     ranges = {name: solution.max(name) - solution.min(name) for name in there}
     names = sorted(there, key=lambda name: -ranges[name])[:MOST_CYCLES]
     try:
         counts = {name: solution.rainflow(name, place=_worst_place(solution, name)) for name in names}
     except MissingExtraError as missing:
-        return Section(notes=(f"Load cycles are not counted: {missing}",))
+        return ReportSection(notes=(f"Load cycles are not counted: {missing}",))
     rows = [
         (breakable(name), number(count.range.max(initial=0.0)), number(count.count.sum()), unit(count.unit))
         for name, count in counts.items()
@@ -140,12 +140,12 @@ def cycles(subject: Subject) -> Section:
     )
     table = columns(("Quantity", "Largest range", "Cycles", "Unit"), rows, (4, 2, 2, 2))
     if subject.sn is None:
-        return Section(paragraphs(in_text(said), table))
+        return ReportSection(paragraphs(in_text(said), table))
     try:
         damage = _damage(solution, subject.sn)
     except ShaftworkError as reason:
-        return Section(paragraphs(in_text(said), table), notes=(f"No damage: {reason}",))
-    return Section(paragraphs(in_text(said), table, damage))
+        return ReportSection(paragraphs(in_text(said), table), notes=(f"No damage: {reason}",))
+    return ReportSection(paragraphs(in_text(said), table, damage))
 
 
 def _worst_place(solution: Solution, name: str) -> int | None:

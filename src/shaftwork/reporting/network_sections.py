@@ -15,7 +15,7 @@ from shaftwork.latex.nomenclature import breakable, condensed, laws, parameters,
 from shaftwork.modelfiles.storage import netlist_text
 from shaftwork.network.netlist import REFERENCE
 from shaftwork.reporting.latex_parts import columns, listed, number, paragraphs, picture
-from shaftwork.reporting.subject import Section, Subject
+from shaftwork.reporting.subject import ReportSection, Subject
 
 if TYPE_CHECKING:
     from shaftwork.equations.records import Equations
@@ -27,10 +27,12 @@ MOST_DRAWN = 60
 """Parts up to which a drawing can be read on a page."""
 
 
-def drawing(subject: Subject) -> Section:
+def drawing(subject: Subject) -> ReportSection:
     """The drive train and its analogue circuit."""
     if len(subject.network.parts) > MOST_DRAWN:
-        return Section(notes=(f"Drawings of more than {MOST_DRAWN} parts cannot be read on a page and are left out.",))
+        return ReportSection(
+            notes=(f"Drawings of more than {MOST_DRAWN} parts cannot be read on a page and are left out.",)
+        )
     figures = {"train": subject.network.draw(), "circuit": subject.network.draw(as_circuit=True)}
     analogy = (
         "In the analogue circuit speed is voltage and torque is current: an inertia is a capacitor, a compliance an "
@@ -39,10 +41,10 @@ def drawing(subject: Subject) -> Section:
     text = paragraphs(
         picture("train", "Drive train"), in_text(analogy), picture("circuit", "Analogue circuit (speed as voltage)")
     )
-    return Section(text, figures)
+    return ReportSection(text, figures)
 
 
-def parts(subject: Subject) -> Section:
+def parts(subject: Subject) -> ReportSection:
     """The parts with their nodes, then the values of their parameters, the laws and the records that are given."""
     rows = (
         (
@@ -58,7 +60,7 @@ def parts(subject: Subject) -> Section:
         laws(subject.equations[0], subject.origins),
         *_records(subject),
     )
-    return Section(text)
+    return ReportSection(text)
 
 
 def _records(subject: Subject) -> Iterator[str]:
@@ -90,15 +92,15 @@ def _plain(values: Sequence[object]) -> bool:
     return all(isinstance(value, float) for value in values)
 
 
-def assumptions(subject: Subject, notes: Sequence[str]) -> Section:
+def assumptions(subject: Subject, notes: Sequence[str]) -> ReportSection:
     """What was chosen, what the equations leave out, how long shafts are divided, and what could not be computed."""
     shafts = (part for part in subject.network.parts if isinstance(part, Shaft))
     models = (f"The shaft {shaft.name} is modelled as {shaft.model!r}." for shaft in shafts)
     left_out = dict.fromkeys(note for equations in subject.equations for note in equations.notes)
-    return Section(listed((*subject.assumptions, *models, *left_out, *dict.fromkeys(notes))))
+    return ReportSection(listed((*subject.assumptions, *models, *left_out, *dict.fromkeys(notes))))
 
 
-def equations(subject: Subject) -> Section:
+def equations(subject: Subject) -> ReportSection:
     """Kirchhoff's equations and the state form, phase by phase; laws stand once, where they first hold."""
     printed: set[tuple[str, str]] = set()
     texts = [_of_phase(blocks.equations, new, printed) for blocks, new in subject.printed]
@@ -112,7 +114,7 @@ def equations(subject: Subject) -> Section:
         if len(texts) > 1
         else "",
     ]
-    return Section(paragraphs(in_text(" ".join(filter(None, said))), *texts))
+    return ReportSection(paragraphs(in_text(" ".join(filter(None, said))), *texts))
 
 
 def _of_phase(equations: Equations, blocks: tuple[Block, ...], printed: set[tuple[str, str]]) -> str:
@@ -134,23 +136,23 @@ def _new(blocks: tuple[Block, ...], printed: set[tuple[str, str]]) -> Iterator[B
             yield replace(block, lines=lines)
 
 
-def nomenclature(subject: Subject) -> Section:
+def nomenclature(subject: Subject) -> ReportSection:
     """The variables of all printed equations with their units."""
     states = {state.name: "state" for equations in subject.equations for state in equations.form.states}
     used = {*(name for blocks, _ in subject.printed for name in blocks.used), *states}
     helpers = tuple(row for blocks, _ in subject.printed for row in blocks.helpers())
-    return Section(variables(subject.equations, used, states, helpers=helpers))
+    return ReportSection(variables(subject.equations, used, states, helpers=helpers))
 
 
-def model_file(subject: Subject) -> Section:
+def model_file(subject: Subject) -> ReportSection:
     """The network as a model file, from which the calculation can be repeated."""
     try:
         text = netlist_text(subject.network.netlist())
     except ModelFileError as reason:
-        return Section(notes=(f"There is no model file: {reason}",))
+        return ReportSection(notes=(f"There is no model file: {reason}",))
     lines = [line for line in text.splitlines() if line]
     wrapped = [piece for line in lines for piece in textwrap.wrap(line, COLUMNS, break_on_hyphens=False)]
     said = "Lines that are too long for the page are wrapped." if len(wrapped) > len(lines) else ""
     body = "\n".join(wrapped).replace(r"\end{verbatim}", "\\end\n{verbatim}")  # a name may hold it
     verbatim = f"\\begingroup\\footnotesize\n\\begin{{verbatim}}\n{body}\n\\end{{verbatim}}\n\\endgroup"
-    return Section(paragraphs(said, verbatim))
+    return ReportSection(paragraphs(said, verbatim))

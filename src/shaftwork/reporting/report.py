@@ -26,7 +26,7 @@ from shaftwork.reporting.report_arguments import (
     refuse_unknown,
     section_names,
 )
-from shaftwork.reporting.subject import Section, Subject
+from shaftwork.reporting.subject import ReportSection, Subject
 from shaftwork.reporting.words import as_latex, read
 from shaftwork.reporting.writers import html_page, write_latex, write_pdf
 from shaftwork.results.fatigue import twisted
@@ -36,7 +36,7 @@ from shaftwork.scenes.catalog import LITERATURE, Scene
 if TYPE_CHECKING:
     from shaftwork.reporting.subject import Picture
 
-SECTIONS: Mapping[str, tuple[str, Callable[[Subject], Section]]] = {
+SECTIONS: Mapping[str, tuple[str, Callable[[Subject], ReportSection]]] = {
     "drawing": ("Drive train and circuit", network_sections.drawing),
     "parts": ("Parts and values", network_sections.parts),
     "assumptions": ("Assumptions", lambda subject: network_sections.assumptions(subject, ())),
@@ -51,7 +51,7 @@ SECTIONS: Mapping[str, tuple[str, Callable[[Subject], Section]]] = {
     "cycles": ("Load cycles and life", motion_sections.cycles),
     "shaft models": ("Models of the shaft compared", vibration_sections.shaft_models),
     "nomenclature": ("Nomenclature", network_sections.nomenclature),
-    "references": ("References", lambda subject: Section(listed((*subject.references, *_standards(subject))))),
+    "references": ("References", lambda subject: ReportSection(listed((*subject.references, *_standards(subject))))),
     "model file": ("Model file", network_sections.model_file),
 }
 """What a report can have, in its order, each with its heading."""
@@ -271,10 +271,10 @@ def _states(solution: Solution | None) -> tuple[str, ...]:
     return names[:MOST_SIGNALS]
 
 
-def _written(about: Subject, words: Mapping[str, tuple[str, Path]], wanted: Sequence[str]) -> dict[str, Section]:
+def _written(about: Subject, words: Mapping[str, tuple[str, Path]], wanted: Sequence[str]) -> dict[str, ReportSection]:
     """The sections that say anything, by heading."""
     introduction, conclusions = WORDS
-    said = {name: Section(*as_latex(name, *text)) for name, text in words.items()}
+    said = {name: ReportSection(*as_latex(name, *text)) for name, text in words.items()}
     written = {name: SECTIONS[name][1](about) for name in SECTIONS if name in wanted and name != WRITTEN_LAST}
     notes = [note for section in written.values() for note in section.notes]
     if WRITTEN_LAST in wanted:
@@ -283,10 +283,11 @@ def _written(about: Subject, words: Mapping[str, tuple[str, Path]], wanted: Sequ
     order.insert(order.index("nomenclature"), conclusions)
     headings = {name: SECTIONS[name][0] if name in SECTIONS else name.capitalize() for name in (introduction, *order)}
     sections = {
-        heading: _joined(said.get(name, Section()), written.get(name, Section())) for name, heading in headings.items()
+        heading: _joined(said.get(name, ReportSection()), written.get(name, ReportSection()))
+        for name, heading in headings.items()
     }
     if WRITTEN_LAST not in wanted:
-        sections["Left out"] = Section(listed(dict.fromkeys(notes)))
+        sections["Left out"] = ReportSection(listed(dict.fromkeys(notes)))
     return {heading: section for heading, section in sections.items() if section.text}
 
 
@@ -298,6 +299,6 @@ def _standards(subject: Subject) -> Iterator[str]:
         yield STANDARDS["torsional"]
 
 
-def _joined(words: Section, section: Section) -> Section:
+def _joined(words: ReportSection, section: ReportSection) -> ReportSection:
     """A section with the words of the user before it."""
     return replace(section, text=paragraphs(words.text, section.text), figures={**words.figures, **section.figures})

@@ -30,7 +30,7 @@ MOST_PHASES = 6
 
 
 @dataclass(frozen=True, eq=False)
-class Section:
+class ReportSection:
     """What a section says and shows.
 
     Args:

@@ -9,19 +9,19 @@ from shaftwork.core.screen import MOST_MODES
 from shaftwork.equations.spelling import in_text
 from shaftwork.latex.nomenclature import breakable
 from shaftwork.reporting.latex_parts import columns, listed, number, paragraphs, picture
-from shaftwork.reporting.subject import Section, Subject
+from shaftwork.reporting.subject import ReportSection, Subject
 from shaftwork.results.observer import RPM
 
 HOLZER_MODES = 3
 """Modes in tables of their own, the lowest."""
 
 
-def frequencies(subject: Subject) -> Section:
+def frequencies(subject: Subject) -> ReportSection:
     """Natural frequencies, damping and shapes about the point of the report."""
     try:
         modes = subject.network.modes(subject.at)
     except ShaftworkError as reason:
-        return Section(notes=(f"Natural frequencies are left out: {reason}",))
+        return ReportSection(notes=(f"Natural frequencies are left out: {reason}",))
     rows = [
         (in_text(name), number(f), number(60 * f), number(damping, 4), in_text(node))
         for name, f, damping, _, node in modes.table[:MOST_MODES]
@@ -31,34 +31,34 @@ def frequencies(subject: Subject) -> Section:
     shapes = picture("modes", "Speeds of the nodes in the lowest modes") if swings else ""
     heads = ("Mode", "Frequency in Hz", "in 1/min", "Damping ratio", "Moves most")
     text = paragraphs(in_text(f"{modes.title}."), in_text(more), columns(heads, rows, (4, 3, 3, 3, 3)), shapes)
-    return Section(text, {"modes": modes.plot()} if swings else {})
+    return ReportSection(text, {"modes": modes.plot()} if swings else {})
 
 
-def campbell(subject: Subject) -> Section:
+def campbell(subject: Subject) -> ReportSection:
     """Natural frequencies and orders over the speed, and where they meet."""
     if not len(subject.speeds):
-        return Section()
+        return ReportSection()
     try:
         if subject.torsional is not None:  # it knows the point of each speed
             diagram = subject.torsional.campbell(subject.orders)
         else:
             diagram = subject.network.campbell(subject.speeds, subject.orders, at=subject.at)
     except ShaftworkError as reason:
-        return Section(notes=(f"The Campbell diagram is left out: {reason}",))
+        return ReportSection(notes=(f"The Campbell diagram is left out: {reason}",))
     rows = [
         (number(one.speed * RPM), number(one.order), number(one.frequency), in_text(one.mode))
         for one in diagram.crossings
     ]
     heads = ("Speed in 1/min", "Order", "Frequency in Hz", "Mode")
     text = paragraphs(picture("campbell", "Campbell diagram"), columns(heads, rows, (2, 1, 2, 3)))
-    return Section(text, {"campbell": diagram.plot()})
+    return ReportSection(text, {"campbell": diagram.plot()})
 
 
-def torsional(subject: Subject) -> Section:
+def torsional(subject: Subject) -> ReportSection:
     """The torsional calculation: vibratory torques and stresses with their limits, barred speeds, modes, heat."""
     calculation = subject.torsional
     if calculation is None:
-        return Section()
+        return ReportSection()
     judged = [name for name, shaft in calculation.items() if shaft.limits is not None]
     rows = [
         tuple(in_text(cell).replace(r"$\mathrm{tau\_c}$", r"$\tau_c$") for cell in row) for row in calculation.table
@@ -77,7 +77,7 @@ def torsional(subject: Subject) -> Section:
         *map(_holzer, calculation.modes[:HOLZER_MODES]),
         _heat(calculation),
     )
-    return Section(text, {"torsional": calculation.plot(*judged)})
+    return ReportSection(text, {"torsional": calculation.plot(*judged)})
 
 
 def _holzer(mode: Any) -> str:
@@ -103,11 +103,11 @@ def _heat(calculation: Any) -> str:
     return columns(("Heat of the vibration in", "W, at most"), rows, (3, 2))
 
 
-def shaft_models(subject: Subject) -> Section:
+def shaft_models(subject: Subject) -> ReportSection:
     """Error and run time of models of a shaft."""
     compared = subject.comparison
     if compared is None:
-        return Section()
+        return ReportSection()
     rows = [
         (
             breakable(trial.model),
@@ -125,4 +125,4 @@ def shaft_models(subject: Subject) -> Section:
         picture("shaft-models", "Error of models of the shaft against their run time"),
         columns(heads, rows, (3, 2, 2, 2, 2)),
     )
-    return Section(text, {"shaft-models": compared.plot()})
+    return ReportSection(text, {"shaft-models": compared.plot()})
