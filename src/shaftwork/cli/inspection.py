@@ -29,7 +29,7 @@ def scenes(_: Namespace, say: Say) -> Data:
     return {"scenes": [{field: getattr(scene, field) for field in fields} for scene in SCENES.values()]}
 
 
-@command("structure, states, time constants, stiffness, and the engine that auto would take", machines=True)
+@command("structure, states, time constants, stiffness, chosen engine", machines=True)
 def check(options: Namespace, say: Say) -> Data:
     """What can be said of a network before anything is simulated."""
     from shaftwork.cli.check_report import structure_report

@@ -67,7 +67,7 @@ def report_options(parser: ArgumentParser) -> None:
     calculation_options(parser)
 
 
-@command("a report to be signed: drawings, equations, motion, extremes, as PDF and HTML", report_options)
+@command("a report to be signed: drawings, equations, motion, extremes", report_options)
 def report(options: Namespace, say: Say) -> Data:
     """The report of a scene or a model file."""
     from shaftwork.reporting.report import report as report_on
