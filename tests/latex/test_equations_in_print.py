@@ -379,7 +379,7 @@ def test_a_document_leaves_out_a_form_that_there_is_not_and_says_why_once() -> N
     assert r"\title{A drive}" in text
 
 
-def test_a_nomenclature_names_the_parameter_and_a_remark_its_marks_outside_formulas() -> None:
+def test_a_nomenclature_names_the_parameter_and_a_remark_has_names_as_text() -> None:
     net = NetworkBuilder("stop")
     net.add(Inertia("J", J=50.0), "a")
     net.add(Brake("brake", tau=1e4), "a")
@@ -388,7 +388,7 @@ def test_a_nomenclature_names_the_parameter_and_a_remark_its_marks_outside_formu
     for row in (r"$r_{\mathrm{belt}}$ & radius of the drum &", r"$\delta_{\mathrm{belt}}$ & incline of the belt &"):
         assert row in text
     remarks = text.partition(r"\section{Remarks}")[2]
-    assert r"$\mathrm{brake.t\_rise}$, $\mathrm{brake.t\_lag}$, belt.d" in remarks
+    assert r"brake.t\_rise, brake.t\_lag, belt.d" in remarks
 
 
 @pytest.mark.parametrize("arguments", [(), (0,), (1,)])

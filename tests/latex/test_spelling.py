@@ -146,3 +146,31 @@ def test_a_long_name_in_parts_keeps_inside_its_column(tmp_path: Path) -> None:
     net.add(Inertia("wheel_of_the_large_fan_12", J=1.0, symbol="f"), "a")
     log = compile_latex(equations_of(net).document(), tmp_path)
     assert max(overfull(log), default=0.0) < 1.0  # points
+
+
+@pytest.mark.parametrize(
+    ("name", "printed"),
+    [
+        ("a_b", r"a\_b"),
+        ("it's 'q'", r"it's \textquotesingle{}q\textquotesingle{}"),
+        ("a--b,,c", "a-{}-b,{},c"),
+        ("[3] *", "{}[3] *"),
+        (r"C:\x", r"C:\textbackslash{}x"),
+        ("ω²", r"$\omega$²"),
+        ("中", "中"),
+        ("\ue000a\x00\n", "U+E000aU+0000 "),
+    ],
+)
+def test_names_outside_formulas_are_text(name: str, printed: str) -> None:
+    assert in_text(name) == printed
+
+
+@compiles
+def test_a_document_says_what_pdflatex_prints_in_place_of_letters_that_it_lacks(tmp_path: Path) -> None:
+    net = NetworkBuilder("中 ạ λ")
+    net.add(Inertia("心", J=1.0), "n")
+    net.add(Spring("轴 ω⁴", c=1.0), "n", "ground")
+    document = equations_of(net).document()
+    for line in (r"\DeclareUnicodeCharacter{4E2D}{[U+4E2D]}", r"\DeclareUnicodeCharacter{1EA1}{a}"):
+        assert line in document
+    compile_latex(document, tmp_path)

@@ -29,6 +29,7 @@ COMMANDS: tuple[Command, ...] = (
     live.open_page,
     frequencies.modes,
     frequencies.campbell,
+    frequencies.torsional,
     studies.sweep,
     studies.compare,
     inspection.export,
@@ -45,7 +46,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options.line = line
     _write_what_a_terminal_cannot_show_as_escapes()
     try:
-        with on_the_command_line("--initial" if "initial" in options else VALUES), _warnings_on_standard_error():
+        values = "--initial" if "initial" in options and "at" not in options else VALUES
+        with on_the_command_line(values), _warnings_on_standard_error():
             data = options.command.run(options, _silent if options.json else _say)
             if options.json:
                 print(json.dumps(_plain(data), indent=2, ensure_ascii=False, allow_nan=False))

@@ -29,7 +29,7 @@ def scenes(_: Namespace, say: Say) -> Data:
     return {"scenes": [{field: getattr(scene, field) for field in fields} for scene in SCENES.values()]}
 
 
-@command("structure, states, time constants, stiffness, and the engine that auto would take", machines=True)
+@command("structure, states, time constants, stiffness, chosen engine", machines=True)
 def check(options: Namespace, say: Say) -> Data:
     """What can be said of a network before anything is simulated."""
     from shaftwork.cli.check_report import structure_report
@@ -61,6 +61,7 @@ def latex_options(parser: ArgumentParser) -> None:
 @command("print the equations as LaTeX", latex_options)
 def latex(options: Namespace, say: Say) -> Data:
     """The equations of a phase: of those that the source of a scene has, or of the one in which the motion begins."""
+    from shaftwork.equations.spelling import in_text
     from shaftwork.latex.document import joined
 
     net, scene = load(options)
@@ -72,7 +73,7 @@ def latex(options: Namespace, say: Say) -> Data:
         return {}
     for phase, text in zip(phases, texts, strict=True):
         if len(phases) > 1:
-            say(rf"\section*{{{phase}}}")
+            say(rf"\section*{{{in_text(phase)}}}")
         say(text)
     return {}
 

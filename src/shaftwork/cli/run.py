@@ -53,7 +53,7 @@ def run(options: Namespace, say: Say) -> Data:
     t_end = end_of(options, scene)
     folder = Folder(options.out, FILES, options.line) if options.out else None
     wanted = tuple(name.strip() for text in options.signals for name in text.split(","))
-    solution = _motion(net, t_end, wanted, options)
+    solution = motion_of(net, t_end, wanted, options)
     unset = "" if options.t_end is not None else " (a model file has no end time; --t-end sets it)"
     say(f"{net.name}: {t_end:g} s of motion{f' ({scene.source})' if scene else unset}")
     for line in scene.chosen if scene else ():
@@ -77,7 +77,7 @@ def _word(name: str, count: int) -> str:
     return name if count != 1 or name == "rhs" else name.removesuffix("s")
 
 
-def _motion(net: Network, t_end: float, wanted: tuple[str, ...], options: Namespace) -> Solution:
+def motion_of(net: Network, t_end: float, wanted: tuple[str, ...], options: Namespace) -> Solution:
     """The run, in which the wanted quantities can be read, or a line on how far it came until it was interrupted."""
     reached = 0.0
     try:

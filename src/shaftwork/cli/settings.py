@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
     from shaftwork.components.base import Component
     from shaftwork.core.parameters import Parameter
     from shaftwork.pipeline.network import Network
+    from shaftwork.results.observer import Array
 
 Item = TypeVar("Item")
 
@@ -97,6 +99,32 @@ def varied(net: Network, texts: Iterable[str], settings: Iterable[str]) -> dict[
         if name in values:
             raise ParameterError(f"--vary gives '{name}' its values, so --set {name}=... has no effect. Leave it out.")
     return values
+
+
+def speeds_in(text: str) -> Array:
+    """(k,) speeds in rad/s, written in 1/min as first:last:count or with commas between them.
+
+    Raises:
+        ParameterError: they are none.
+    """
+    import numpy as np
+
+    from shaftwork.results.observer import RPM
+
+    most = 100_000  # more is a typing error
+    ends = text.split(":")
+    try:
+        if len(ends) == 3:
+            n = np.linspace(float(ends[0]), float(ends[1]), min(int(ends[2]), most))
+        else:
+            n = np.array([float(speed) for speed in text.split(",")])
+    except ValueError:
+        n = np.empty(0)
+    if not (n.size and bool(((n >= 0) & (n < math.inf)).all())):
+        raise ParameterError(
+            f"--speeds {text}: write first:last:count in 1/min, such as 300:900:61, or speeds with commas between them."
+        )
+    return np.asarray(n / RPM)
 
 
 def follows_speed(text: str) -> bool:

@@ -13,6 +13,8 @@ LINES, COLUMNS = 25, 100
 """Size of the screen."""
 ROWS = 12
 """Of a printed table that could have any number of them: half a screen."""
+MOST_MODES = 30
+"""Modes in a table, the lowest, and resonances: a page."""
 Show = Callable[[float, str], None]
 """Told how much is done, and a word or two on it."""
 FORMAT = "{desc}: {percentage:3.0f}%|{bar}| {n:.4g} of {total:.4g} {unit} [{elapsed}<{remaining}]"

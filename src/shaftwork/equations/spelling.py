@@ -13,7 +13,7 @@ ESCAPES = {
     "}": r"\text{\}}",
     "_": r"\_",
     "%": r"\%",
-    "&": r"\&",
+    "&": r"\text{\&}",
     "#": r"\#",
     "$": r"\$",
     "^": r"\wedge ",
@@ -25,6 +25,18 @@ ESCAPES = {
     "`": r"\text{`}",
     "°": r"{^{\circ}}",
 }
+"""Signs in a formula."""
+ESCAPES_IN_TEXT = {
+    "\\": r"\textbackslash{}",
+    "^": r"\textasciicircum{}",
+    "~": r"\textasciitilde{}",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+    "`": r"\`{}",
+    "°": r"\textdegree{}",
+    **{sign: f"\\{sign}" for sign in "{}_%&#$"},
+}
+"""Signs outside formulas."""
 ACCENTED = "À-ÖØ-öø-ĥĨ-ķĹ-ľŁ-ňŊ-ťŨ-žȘ-ț"
 """Letters of Latin-1 and Latin Extended that the T1 encoding has, as ranges of a regular expression."""
 SUPERSCRIPTS = "⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻ⁿ"
@@ -35,8 +47,15 @@ GREEK = (
 )
 """Greek letters that are control words of LaTeX."""
 PLAIN = re.compile(f"[A-Za-z0-9.,:;()'=/!?+*{ACCENTED}-]*")
-"""Words that are printed outside formulas as they are."""
+"""Words that a notebook shows outside formulas as they are."""
 MARKS = ".,:;!?"
+SET_UP = "–—‘’‚“”„‹›«»…€£§¶©®™×÷±µ·†‡¹²³¼½¾¿¡"
+"""Signs besides accented letters that LaTeX prints with T1 fonts."""
+LETTER = r"[^\W\d_]"
+IN_TEXT = re.compile(
+    rf"(?P<ligature>(?P<sign>[-,])(?=(?P=sign)))|(?P<quote>(?<!{LETTER})'|'(?!{LETTER}))|(?P<other>.)", re.DOTALL
+)
+"""A sign that LaTeX would draw together with the next one, a straight quote, which is no apostrophe, or any other."""
 STRETCH = re.compile(f"(?P<accented>[{ACCENTED}]+)|(?P<raised>[{SUPERSCRIPTS}]+)|(?P<other>.)", re.DOTALL)
 """What is escaped in one go."""
 ALLOWED = re.compile(
@@ -83,7 +102,9 @@ def _escape(character: str) -> str:
     if character.isascii() and character.isprintable():
         return character
     word = _greek(character)
-    return f"\\{word} " if word in GREEK else _plain(character) or f"U{ord(character):04X}"
+    if word in GREEK:
+        return f"\\{word} "
+    return _plain(character) or (rf"\text{{{character}}}" if character.isprintable() else f"U{ord(character):04X}")
 
 
 def _greek(character: str) -> str:
@@ -115,11 +136,68 @@ def _spaced(text: str) -> str:
 
 
 def in_text(text: str) -> str:
-    """Any text outside formulas: words with signs that LaTeX reads otherwise are escaped."""
-    return " ".join(map(_word_in_text, text.split(" ")))
+    """Any text outside formulas: whatever it holds, a document shows the same.
+
+    Letters that LaTeX has only in formulas are formulas. Those that it has not at all stay as they are; a document
+    says before its text what pdflatex prints in their place (`stand_ins`).
+    """
+    printed = "".join(map(_in_text, IN_TEXT.finditer(unicodedata.normalize("NFC", text))))
+    return f"{{}}{printed}" if printed[:1] in ("[", "*") else printed  # at the end of a row they are options of it
 
 
-def _word_in_text(word: str) -> str:
+def _in_text(match: re.Match[str]) -> str:
+    if match["quote"]:
+        return r"\textquotesingle{}"
+    character = match[0]
+    if match["ligature"]:
+        return f"{character}{{}}"
+    if character in ESCAPES_IN_TEXT:
+        return ESCAPES_IN_TEXT[character]
+    if character.isascii() and character.isprintable():
+        return character
+    word = _greek(character)
+    if word in GREEK:
+        return rf"$\{word}$"
+    if character.isspace():
+        return " "
+    return character if character.isprintable() else f"U+{ord(character):04X}"
+
+
+def stand_ins(latex: str) -> str:
+    """Lines for the preamble of a document with letters that pdflatex has not; empty where it has all.
+
+    It prints letters without their accents, and else their numbers.
+    """
+    signs = dict.fromkeys(latex)
+    lacking = [sign for sign in signs if not (sign.isascii() or sign in SET_UP or re.match(f"[{ACCENTED}]", sign))]
+    if not lacking:
+        return ""
+    declared = [rf"\DeclareUnicodeCharacter{{{ord(sign):04X}}}{{{_stand_in(sign)}}}" for sign in lacking]
+    lines = (
+        "% pdflatex lacks some letters of this document, and prints others in their place. lualatex prints them,",
+        r"% with \setmainfont{a font that has them}.",
+        r"\ifdefined\pdftexversion",
+        *declared,
+        r"\else",
+        r"\usepackage{fontspec}",
+        r"\fi",
+    )
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _stand_in(sign: str) -> str:
+    if sign in SUPERSCRIPTS:
+        return rf"\textsuperscript{{{_plain(sign)}}}"
+    word = _greek(sign)
+    return rf"\ensuremath{{\{word}}}" if word in GREEK else _plain(sign) or f"[U+{ord(sign):04X}]"
+
+
+def in_notebook(text: str) -> str:
+    """Any text outside formulas for MathJax, which reads no escapes there: words that need some are formulas."""
+    return " ".join(map(_word_in_notebook, text.split(" ")))
+
+
+def _word_in_notebook(word: str) -> str:
     """A word with the marks that end it behind the formula, if it is one."""
     name = word.rstrip(MARKS)
     return word if PLAIN.fullmatch(word) else f"$\\mathrm{{{escaped(name)}}}${word[len(name) :]}"

@@ -204,7 +204,7 @@ class Blocks:
             raise CompileError(f"'{self.equations.form.graph.name}' has no Shaft. Take form='state'.")
         for field in self.equations.fields:
             along, boundary, definitions = lines_of_field(field, values=self.values)
-            yield Block(f"Along {in_text(field.part.name)}", along)
+            yield Block(f"Along {field.part.name}", along)
             yield Block("At its ends", boundary)
             yield Block("Derived quantities", definitions)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import CompileError, ShaftworkError
 from shaftwork.equations.quantities import INSTEAD
-from shaftwork.equations.spelling import in_text, without_marks
+from shaftwork.equations.spelling import in_notebook, in_text, stand_ins, without_marks
 from shaftwork.latex.blocks import Block, Blocks
 from shaftwork.latex.nomenclature import nomenclature
 from shaftwork.latex.printing import aligned
@@ -51,13 +51,14 @@ def _phase(equations: Equations) -> tuple[str, ...]:
 
 
 def _paragraph(block: Block) -> str:
-    return f"\\paragraph{{{block.heading}}}\\mbox{{}}\n{_content(block)}"
+    return f"\\paragraph{{{in_text(block.heading)}}}\\mbox{{}}\n{_content(block)}"
 
 
 def rendered(equations: Equations, blocks: Iterable[Block]) -> str:
     """Blocks for a notebook, below the phase for which they hold."""
-    phase = (f"$\\textbf{{Phase}}$ {in_text(equations.phase)}\n",) if equations.phase else ()
-    return "\n".join((*phase, *(f"$\\textbf{{{block.heading}}}$\n{_content(block)}" for block in blocks)))
+    phase = (f"$\\textbf{{Phase}}$ {in_notebook(equations.phase)}\n",) if equations.phase else ()
+    shown = (f"$\\textbf{{{in_notebook(block.heading)}}}$\n{_content(block)}" for block in blocks)
+    return "\n".join((*phase, *shown))
 
 
 def blocks_of(equations: Equations, form: Form | None, *, values: bool) -> tuple[Block, ...]:
@@ -145,7 +146,8 @@ def joined(documents: Sequence[str]) -> str:
     end = "\\end{document}\n"
     head, begin, _ = documents[0].partition(BEGIN)
     bodies = "\\clearpage".join(text.partition(BEGIN)[2].removesuffix(end) for text in documents)
-    return f"{head}{begin}{bodies}{end}"
+    letters = stand_ins("".join(letter for letter in dict.fromkeys(bodies) if letter not in documents[0]))
+    return f"{head}{letters}{begin}{bodies}{end}"
 
 
 def in_sections(
@@ -161,9 +163,9 @@ def in_sections(
     """
     notes = "\n\n".join(map(in_text, (*remarks, *equations.notes)))
     whole = {"Phase": in_text(equations.phase), **sections, "Remarks": notes}
-    printed = (f"\\section{{{heading}}}\n{text}" for heading, text in whole.items() if text)
+    printed = "\n".join(f"\\section{{{heading}}}\n{text}" for heading, text in whole.items() if text)
     head = f"\\title{{{in_text(title or equations.form.graph.name)}}}"
-    return "\n".join((PREAMBLE, head, BEGIN, *printed, r"\end{document}", ""))
+    return f"{PREAMBLE}\n{stand_ins(head + printed)}{head}\n{BEGIN}\n{printed}\n\\end{{document}}\n"
 
 
 def section(blocks: Iterable[Block]) -> str:

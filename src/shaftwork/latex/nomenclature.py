@@ -43,7 +43,7 @@ def nomenclature(
         besides: rows before them, of quantities that belong to no part.
         helpers: rows after them, of letters that stand for sums and weights.
     """
-    tables = (variables((equations,), used, noted, besides, helpers), parameters(equations), laws(equations))
+    tables = (variables((equations,), used, noted, besides, helpers), parameters((equations,)), laws(equations))
     return "\n".join(filter(None, tables))
 
 
@@ -80,40 +80,70 @@ def _told_apart(rows: Sequence[Cells]) -> Iterator[Cells]:
         yield symbol, f"{meaning}, no.\\ {seen[meaning, owner]}" if several else meaning, owner, measure
 
 
-def parameters(equations: Equations, origins: Mapping[str, str] | None = None) -> str:
+def parameters(
+    phases: Sequence[Equations],
+    origins: Mapping[str, str] | None = None,
+    used: Sequence[Container[str]] = (),
+) -> str:
     """The table of the parameters with their values, without those that have no effect.
 
     Args:
-        equations: what knows all letters.
+        phases: equations of the same network in one or several phases.
         origins: where values come from, in words, by "part.parameter" or by part; a column of its own where given.
+        used: names in the printed equations of each phase, whose letters the table has; by default those of the first.
     """
-    names, values, whence = equations.symbol_names, equations.values, origins or {}
-    read = effective(equations.form.graph)
-    rows = [
-        (
-            _formula(names[letter.name]),
+    whence = origins or {}
+    rows: dict[tuple[str, str], Cells] = {}
+    for letter, latex in _parameter_letters(phases, used):
+        equations = next(one for one in phases if letter.name in one.values)
+        computed = letter.name not in equations.form.graph.parameters
+        origin = "computed" if computed else whence.get(letter.name, whence.get(letter.owner, ""))
+        rows[letter.name, latex] = (
+            _formula(latex),
             in_text(LAW_TOO.sub("", letter.meaning)),
             _owner(letter),
-            f"${printed_number(values[letter.name])}$",
+            f"${printed_number(equations.values[letter.name])}$",
             unit(letter.unit),
-            *([in_text(whence.get(letter.name, whence.get(letter.owner, "")))] if whence else []),
+            *([in_text(origin)] if whence else []),
         )
-        for letter in equations.letters
-        if letter.parameter and (letter.name in read or letter.name not in equations.form.graph.parameters)
-    ]
     heads = ("Parameter", "Meaning", "Of", "Value", "Unit", *(["From"] if whence else []))
-    return table(_columns(*((28, 30, 22, 19, 17, 22) if whence else (34, 38, 30, 21, 20))), heads, rows)
+    widths = (28, 30, 22, 19, 17, 22) if whence else (34, 38, 30, 21, 20)
+    return table(_columns(*widths), heads, [*rows.values()])
 
 
-def laws(equations: Equations) -> str:
+def _parameter_letters(phases: Sequence[Equations], used: Sequence[Container[str]]) -> Iterator[tuple[Letter, str]]:
+    """Parameters that have an effect, each under every letter that it is printed with."""
+    printed: dict[str, list[str]] = {}
+    for equations, names in zip(phases, used, strict=False):
+        for letter in equations.letters:
+            if letter.parameter and letter.name in names:
+                printed.setdefault(letter.name, []).append(equations.symbol_names[letter.name])
+    seen: set[str] = set()
+    for equations in phases:
+        graph = equations.form.graph
+        read = effective(graph)
+        for letter in equations.letters:
+            if letter.name in seen or not letter.parameter:
+                continue
+            if letter.name in read or letter.name not in graph.parameters:
+                seen.add(letter.name)
+                for latex in dict.fromkeys(printed.get(letter.name, [equations.symbol_names[letter.name]])):
+                    yield letter, latex
+
+
+def laws(equations: Equations, origins: Mapping[str, str] | None = None) -> str:
     """The table of the laws that are given: with all points of their tables, of which formulas show some, and also
-    where the phase has another one.
+    where the phase has another one. Origins are those of `parameters`.
     """
-    return table(_columns(34, 24, 68, 20), ("Law", "Of", LAWS, "Unit"), [*_laws(equations)])
+    heads = ("Law", "Of", LAWS, "Unit", *(["From"] if origins else []))
+    return table(
+        _columns(*((26, 22, 54, 16, 22) if origins else (34, 24, 68, 20))), heads, [*_laws(equations, origins)]
+    )
 
 
-def _laws(equations: Equations) -> Iterator[Cells]:
+def _laws(equations: Equations, origins: Mapping[str, str] | None) -> Iterator[Cells]:
     """Rows of the laws that are given as tables or formulas."""
+    whence = origins or {}
     writer = Writer({}, (), (), {})
     for part in equations.form.graph.parts:
         for name, declared in part.component.declared.items():
@@ -129,9 +159,10 @@ def _laws(equations: Equations) -> Iterator[Cells]:
                 ]
                 # 40 in a row: rows do not run over pages
                 cells += [", ".join(points[first : first + 40]) for first in range(0, len(points), 40)]
-            heads = [(in_text(declared.meaning), breakable(part.name), unit(declared.unit))]
-            for (meaning, owner, measure), cell in zip_longest(heads, cells, fillvalue=("", "", "")):
-                yield meaning, owner, str(cell), measure
+            origin = in_text(whence.get(f"{part.name}.{name}", whence.get(part.name, "")))
+            heads = [(in_text(declared.meaning), breakable(part.name), unit(declared.unit), origin)]
+            for (meaning, owner, measure, source), cell in zip_longest(heads, cells, fillvalue=("", "", "", "")):
+                yield meaning, owner, str(cell), measure, *([source] if whence else [])
 
 
 def _formula(latex: str) -> str:
@@ -155,7 +186,7 @@ def breakable(name: str) -> str:
 
 def column(width: int) -> str:
     """A column of a fixed width in millimetres: LaTeX needs a second run to know the widths of others."""
-    return rf">{{\raggedright\arraybackslash}}p{{{width}mm}}"
+    return rf">{{\raggedright\arraybackslash{{}}}}p{{{width}mm}}"
 
 
 def _columns(*widths: int) -> str:
@@ -185,7 +216,7 @@ def _ruled(columns: str, headings: Cells, rows: Sequence[Cells]) -> str:
 \\endhead
 \\bottomrule
 \\endfoot
-{body}
+{{}}{body}
 \\end{{longtable}}"""
     return without_marks(text)
 

@@ -18,6 +18,7 @@ from shaftwork.animation.turning import Train, train_of
 from shaftwork.codegen.model_observer import ModelObserver
 from shaftwork.core.errors import ShaftworkError, SimulationError, no_quantity
 from shaftwork.core.notices import FILTERS
+from shaftwork.core.screen import MOST_MODES
 from shaftwork.frequency.exact_networks import exact_shafts
 from shaftwork.frequency.natural_modes import Modes
 from shaftwork.live.page_requests import checked, objections
@@ -33,8 +34,6 @@ from shaftwork.scenes.catalog import Scene
 
 POINTS = 600
 """Output times of a motion: as many as a plot on a screen has room for."""
-MOST_MODES = 30
-"""Modes in the table, the lowest."""
 END = 10.0
 """End of the motion of a network without a scene, s."""
 SHORTEST, LONGEST = 4.0, 12.0

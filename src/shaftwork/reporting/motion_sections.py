@@ -12,48 +12,64 @@ from shaftwork.core.screen import counted
 from shaftwork.equations.spelling import in_text
 from shaftwork.latex.nomenclature import breakable, unit
 from shaftwork.reporting.latex_parts import columns, listed, number, paragraphs, picture
-from shaftwork.results.fatigue import twisted
+from shaftwork.reporting.subject import ReportSection, Subject
+from shaftwork.results.fatigue import SNLine, twisted
 
 if TYPE_CHECKING:
-    from shaftwork.reporting.subject import Subject
+    from matplotlib.figure import Figure
+
     from shaftwork.results.solution import Solution
 
 CURVES = 4
 """Quantities in a picture, which is then no higher than a page."""
 ROWS = 20
 """Phases listed of the beginning, and as many of the end, of a motion that has more."""
+MOST_STATES = 40
+"""Quantities whose start and end are listed."""
 MOST_CYCLES = 6
 """Quantities whose load cycles are counted."""
 
 
-def conditions(subject: Subject) -> str:
-    """Where the motion starts and how long it lasts."""
+def conditions(subject: Subject) -> ReportSection:
+    """Where the motion starts, in which modes, how long it lasts, and where it ends."""
     solution = subject.solution
     if solution is None:
-        return ""
+        return ReportSection()
     start, end = solution.steps[0], solution.steps[-1]
-    named = ((name, value) for name, value in solution.initial.items() if isinstance(value, float) and value)
-    rows = [(breakable(name), number(value), unit(solution.observer.units.get(name, ""))) for name, value in named]
-    begins = "The motion starts with the values below." if rows else "The motion starts at rest."
-    lasts = f"It is computed from {start:g} s to {end:g} s."
-    return paragraphs(in_text(f"{begins} {lasts}"), columns(("Quantity", "Start value", "Unit"), rows, (3, 2, 2)))
+    names = [name for name in dict.fromkeys((*solution.initial, *solution.states)) if name in solution]
+    courses = [(name, solution[name]) for name in names[:MOST_STATES]]
+    rows = [
+        (breakable(name), number(course[0]), number(course[-1]), unit(solution.reader.unit(name)))
+        for name, course in courses
+        if course.ndim == 1
+    ]
+    begins = "with the values below" if any(course[0].any() for _, course in courses) else "at rest"
+    modes = f", in the modes: {solution.phases[0].name}" if solution.phases else ""
+    said = [f"The motion starts {begins}{modes}.", f"It is computed from {start:g} s to {end:g} s."]
+    if len(names) > MOST_STATES:
+        said.append(f"The first {MOST_STATES} of {len(names)} quantities that say where it starts are listed.")
+    said.append("What drives and loads it over time stands among the values and laws of the parts.")
+    heads = ("Quantity", "At the start", "At the end", "Unit")
+    return ReportSection(paragraphs(in_text(" ".join(said)), columns(heads, rows, (4, 2, 2, 2))))
 
 
-def motion(subject: Subject) -> str:
+def motion(subject: Subject) -> ReportSection:
     """Curves of the signals, and the phases of the motion."""
     solution = subject.solution
     if solution is None or not subject.signals:
-        return ""
-    pictures = []
+        return ReportSection()
+    pictures: list[str] = []
+    figures: dict[str, Figure] = {}
+    curves: dict[str, tuple[str, ...]] = {}
     count = -(-len(subject.signals) // CURVES)
     for place in range(count):
         names = tuple(
             subject.signals[k] for k in range(len(subject.signals)) if k * count // len(subject.signals) == place
         )
         label = f"motion-{place + 1}"
-        subject.figures[label], subject.curves[label] = solution.plot(*names), names
+        figures[label], curves[label] = solution.plot(*names), names
         pictures.append(picture(label, f"{', '.join(names)} over time"))
-    return paragraphs(*pictures, _phases(solution))
+    return ReportSection(paragraphs(*pictures, _phases(solution)), figures, curves)
 
 
 def _phases(solution: Solution) -> str:
@@ -68,28 +84,27 @@ def _phases(solution: Solution) -> str:
     return paragraphs(in_text(events), columns(("From s", "To s", "Phase"), cells, (1, 1, 6)))
 
 
-def extremes(subject: Subject) -> str:
+def extremes(subject: Subject) -> ReportSection:
     """The true extremes of the signals and of all that is twisted, found between the output times too."""
     solution = subject.solution
     if solution is None:
-        return ""
+        return ReportSection()
     names = dict.fromkeys((*subject.signals, *twisted(solution.reader)))
     rows = []
-    for name in names:
-        least, most, mean, end = solution.extremes.row(name)
+    for name, (least, most, mean, end) in solution.extremes.rows(tuple(names)).items():
         values = (number(least), number(least.t, 4), number(most), number(most.t, 4), number(mean), number(end))
         part, _, quantity = name.rpartition(".")
         rows.append((rf"{breakable(part)}.\allowbreak {breakable(quantity)} in {unit(least.unit)}", *values))
     said = "Extremes are those of the motion itself, searched between the output times, on both sides of every jump."
     heads = ("Quantity", "Minimum", "at s", "Maximum", "at s", "Mean", "End")
-    return paragraphs(in_text(said), columns(heads, rows, (4.4, 4.25, 3.1, 4.25, 3.1, 4.15, 4.15)))
+    return ReportSection(paragraphs(in_text(said), columns(heads, rows, (4.4, 4.25, 3.1, 4.25, 3.1, 4.15, 4.15))))
 
 
-def energy(subject: Subject) -> str:
+def energy(subject: Subject) -> ReportSection:
     """Who supplies and who loses energy, how much is left over, and how accurately was integrated."""
     solution = subject.solution
     if solution is None:
-        return ""
+        return ReportSection()
     balance = solution.energy
     rows = [("supplied by", breakable(part), number(value)) for part, value in balance.supplied_by.items() if value]
     rows += [("lost in", breakable(part), number(value)) for part, value in balance.lost_in.items() if value]
@@ -99,22 +114,21 @@ def energy(subject: Subject) -> str:
         f"{solution.rtol:g}. What is supplied less what is lost and stored is {balance.residual:.1e} of the work done "
         "at most; it measures the error of the integration without a reference."
     )
-    return paragraphs(columns(("Energy", "Part", "J"), rows, (2, 4, 2)), in_text(said))
+    return ReportSection(paragraphs(columns(("Energy", "Part", "J"), rows, (2, 4, 2)), in_text(said)))
 
 
-def cycles(subject: Subject) -> str:
+def cycles(subject: Subject) -> ReportSection:
     """Load cycles of what is twisted, and the damage by its S-N line."""
     solution = subject.solution
     there = twisted(solution.reader) if solution else ()
     if solution is None or not there:
-        return ""
+        return ReportSection()
     ranges = {name: solution.max(name) - solution.min(name) for name in there}
     names = sorted(there, key=lambda name: -ranges[name])[:MOST_CYCLES]
     try:
         counts = {name: solution.rainflow(name, place=_worst_place(solution, name)) for name in names}
     except MissingExtraError as missing:
-        subject.notes.append(f"Load cycles are not counted: {missing}")
-        return ""
+        return ReportSection(notes=(f"Load cycles are not counted: {missing}",))
     rows = [
         (breakable(name), number(count.range.max(initial=0.0)), number(count.count.sum()), unit(count.unit))
         for name, count in counts.items()
@@ -125,7 +139,13 @@ def cycles(subject: Subject) -> str:
         + (f" Of {len(there)} shafts and springs those with the largest range do." if len(there) > len(names) else "")
     )
     table = columns(("Quantity", "Largest range", "Cycles", "Unit"), rows, (4, 2, 2, 2))
-    return paragraphs(in_text(said), table, _damage(subject, solution))
+    if subject.sn is None:
+        return ReportSection(paragraphs(in_text(said), table))
+    try:
+        damage = _damage(solution, subject.sn)
+    except ShaftworkError as reason:
+        return ReportSection(paragraphs(in_text(said), table), notes=(f"No damage: {reason}",))
+    return ReportSection(paragraphs(in_text(said), table, damage))
 
 
 def _worst_place(solution: Solution, name: str) -> int | None:
@@ -135,19 +155,18 @@ def _worst_place(solution: Solution, name: str) -> int | None:
     return None if place is None else int(np.argmin(np.abs(solution.places[name] - place)))
 
 
-def _damage(subject: Subject, solution: Solution) -> str:
-    if subject.sn is None:
-        return ""
-    try:
-        damages = solution.damage(sn=subject.sn)
-    except ShaftworkError as reason:
-        subject.notes.append(f"No damage: {reason}")
-        return ""
+def _damage(solution: Solution, sn: SNLine | Mapping[str, SNLine]) -> str:
+    """Damage by quantity.
+
+    Raises:
+        ShaftworkError: a quantity has no load cycles.
+    """
+    damages = solution.damage(sn=sn)
     rows = [
         (breakable(name), number(worn.damage), number(worn.repetitions), number(worn.hours))
         for name, worn in damages.items()
     ]
-    lines = subject.sn if isinstance(subject.sn, Mapping) else {"all": subject.sn}
+    lines = sn if isinstance(sn, Mapping) else {"all": sn}
     said = [f"S-N line of {name}: {line!r}" for name, line in lines.items()]
     heads = ("Quantity", "Damage", "Motions to failure", "Hours to failure")
     return paragraphs(columns(heads, rows, (4, 2, 3, 3)), listed(said))

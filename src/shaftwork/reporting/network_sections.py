@@ -3,48 +3,49 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
+from dataclasses import fields, is_dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import ModelFileError
 from shaftwork.equations.spelling import in_text, without_marks
-from shaftwork.latex.document import section
+from shaftwork.latex.document import section as printed_section
 from shaftwork.latex.nomenclature import breakable, condensed, laws, parameters, variables
 from shaftwork.modelfiles.storage import netlist_text
 from shaftwork.network.netlist import REFERENCE
-from shaftwork.reporting.latex_parts import columns, listed, paragraphs, picture
+from shaftwork.reporting.latex_parts import columns, listed, number, paragraphs, picture
+from shaftwork.reporting.subject import ReportSection, Subject
 
 if TYPE_CHECKING:
     from shaftwork.equations.records import Equations
     from shaftwork.latex.blocks import Block
-    from shaftwork.reporting.subject import Subject
 
-COLUMNS = 82
+COLUMNS = 96
 """Letters of a line of the model file, which a page has room for."""
 MOST_DRAWN = 60
 """Parts up to which a drawing can be read on a page."""
 
 
-def drawing(subject: Subject) -> str:
+def drawing(subject: Subject) -> ReportSection:
     """The drive train and its analogue circuit."""
     if len(subject.network.parts) > MOST_DRAWN:
-        subject.notes.append(f"Drawings of more than {MOST_DRAWN} parts cannot be read on a page and are left out.")
-        return ""
-    subject.figures["train"] = subject.network.draw()
-    subject.figures["circuit"] = subject.network.draw(as_circuit=True)
+        return ReportSection(
+            notes=(f"Drawings of more than {MOST_DRAWN} parts cannot be read on a page and are left out.",)
+        )
+    figures = {"train": subject.network.draw(), "circuit": subject.network.draw(as_circuit=True)}
     analogy = (
         "In the analogue circuit speed is voltage and torque is current: an inertia is a capacitor, a compliance an "
         "inductor, a damper a resistor."
     )
-    return paragraphs(
+    text = paragraphs(
         picture("train", "Drive train"), in_text(analogy), picture("circuit", "Analogue circuit (speed as voltage)")
     )
+    return ReportSection(text, figures)
 
 
-def parts(subject: Subject) -> str:
-    """The parts with their nodes, then the values of their parameters, then the laws that are given."""
+def parts(subject: Subject) -> ReportSection:
+    """The parts with their nodes, then the values of their parameters, the laws and the records that are given."""
     rows = (
         (
             breakable(placed.part.name),
@@ -53,23 +54,53 @@ def parts(subject: Subject) -> str:
         )
         for placed in subject.network.netlist().placed
     )
-    equations = subject.equations[0]
-    return paragraphs(
+    text = paragraphs(
         columns(("Part", "Kind", "At the nodes"), rows, (3, 3, 5)),
-        parameters(equations, subject.origins),
-        laws(equations),
+        parameters(subject.equations, subject.origins, [blocks.used for blocks, _ in subject.printed]),
+        laws(subject.equations[0], subject.origins),
+        *_records(subject),
     )
+    return ReportSection(text)
 
 
-def assumptions(subject: Subject) -> str:
-    """What was chosen, what the equations leave out, and how long shafts are divided."""
+def _records(subject: Subject) -> Iterator[str]:
+    """Tables of what parts have as records, such as the orders of a torque; those of like parts once."""
+    owners: dict[tuple[str, Any], list[str]] = {}
+    for part in subject.network.parts:
+        for name, declared in part.declared.items():
+            record = getattr(part, name)
+            # models of shafts are among the assumptions
+            if declared.record is not None and is_dataclass(record) and not isinstance(part, Shaft):
+                owners.setdefault((declared.meaning, record), []).append(part.name)
+    for (meaning, record), names in owners.items():
+        values = {field.name: getattr(record, field.name) for field in fields(record)}
+        lists = {name: value for name, value in values.items() if isinstance(value, tuple) and value}
+        scalars = [f"{name} = {value:.6g}" for name, value in values.items() if isinstance(value, float) and value]
+        said = f"{meaning.capitalize()} of {', '.join(names)}"
+        yield in_text(f"{said}{': ' if scalars else ''}{', '.join(scalars)}.")
+        heads = [in_text(name.capitalize()) for name in lists]
+        if len({len(value) for value in lists.values()}) == 1 and all(map(_plain, lists.values())):
+            rows = [[number(value, 6) for value in row] for row in zip(*lists.values(), strict=True)]
+            yield columns(heads, rows, (1,) * len(lists))
+        elif lists:
+            rows = [[in_text(name), in_text(str(value))] for name, value in lists.items()]
+            yield columns(("Values", ""), rows, (1, 6))
+
+
+def _plain(values: Sequence[object]) -> bool:
+    """Whether these are numbers, and not rows of them."""
+    return all(isinstance(value, float) for value in values)
+
+
+def assumptions(subject: Subject, notes: Sequence[str]) -> ReportSection:
+    """What was chosen, what the equations leave out, how long shafts are divided, and what could not be computed."""
     shafts = (part for part in subject.network.parts if isinstance(part, Shaft))
     models = (f"The shaft {shaft.name} is modelled as {shaft.model!r}." for shaft in shafts)
     left_out = dict.fromkeys(note for equations in subject.equations for note in equations.notes)
-    return listed((*subject.assumptions, *models, *left_out, *dict.fromkeys(subject.notes)))
+    return ReportSection(listed((*subject.assumptions, *models, *left_out, *dict.fromkeys(notes))))
 
 
-def equations(subject: Subject) -> str:
+def equations(subject: Subject) -> ReportSection:
     """Kirchhoff's equations and the state form, phase by phase; laws stand once, where they first hold."""
     printed: set[tuple[str, str]] = set()
     texts = [_of_phase(blocks.equations, new, printed) for blocks, new in subject.printed]
@@ -83,17 +114,17 @@ def equations(subject: Subject) -> str:
         if len(texts) > 1
         else "",
     ]
-    return paragraphs(in_text(" ".join(filter(None, said))), *texts)
+    return ReportSection(paragraphs(in_text(" ".join(filter(None, said))), *texts))
 
 
 def _of_phase(equations: Equations, blocks: tuple[Block, ...], printed: set[tuple[str, str]]) -> str:
     blocks = tuple(_new(blocks, printed))
     if not equations.phase:
-        return section(blocks)
+        return printed_section(blocks)
     names = condensed([(f"${equations.symbol_names[state.name]}$",) for state in equations.form.states])
     states = ", ".join(name for (name,) in names) or "none"
     title = f"\\subsection{{{in_text(equations.phase)}}}"
-    return paragraphs(title, without_marks(f"States: {states}."), section(blocks))
+    return paragraphs(title, without_marks(f"States: {states}."), printed_section(blocks))
 
 
 def _new(blocks: tuple[Block, ...], printed: set[tuple[str, str]]) -> Iterator[Block]:
@@ -105,22 +136,23 @@ def _new(blocks: tuple[Block, ...], printed: set[tuple[str, str]]) -> Iterator[B
             yield replace(block, lines=lines)
 
 
-def nomenclature(subject: Subject) -> str:
+def nomenclature(subject: Subject) -> ReportSection:
     """The variables of all printed equations with their units."""
     states = {state.name: "state" for equations in subject.equations for state in equations.form.states}
     used = {*(name for blocks, _ in subject.printed for name in blocks.used), *states}
     helpers = tuple(row for blocks, _ in subject.printed for row in blocks.helpers())
-    return variables(subject.equations, used, states, helpers=helpers)
+    return ReportSection(variables(subject.equations, used, states, helpers=helpers))
 
 
-def model_file(subject: Subject) -> str:
+def model_file(subject: Subject) -> ReportSection:
     """The network as a model file, from which the calculation can be repeated."""
     try:
         text = netlist_text(subject.network.netlist())
     except ModelFileError as reason:
-        subject.notes.append(f"There is no model file: {reason}")
-        return ""
-    lines = [part for line in text.rstrip().splitlines() for part in textwrap.wrap(line, COLUMNS) or [""]]
-    said = "" if len(lines) == len(text.rstrip().splitlines()) else "Lines that are too long for the page are wrapped."
-    body = "\n".join(lines)
-    return paragraphs(said, f"\\begin{{verbatim}}\n{body}\n\\end{{verbatim}}")
+        return ReportSection(notes=(f"There is no model file: {reason}",))
+    lines = [line for line in text.splitlines() if line]
+    wrapped = [piece for line in lines for piece in textwrap.wrap(line, COLUMNS, break_on_hyphens=False)]
+    said = "Lines that are too long for the page are wrapped." if len(wrapped) > len(lines) else ""
+    body = "\n".join(wrapped).replace(r"\end{verbatim}", "\\end\n{verbatim}")  # a name may hold it
+    verbatim = f"\\begingroup\\footnotesize\n\\begin{{verbatim}}\n{body}\n\\end{{verbatim}}\n\\endgroup"
+    return ReportSection(paragraphs(said, verbatim))

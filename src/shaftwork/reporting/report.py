@@ -3,40 +3,45 @@
 from __future__ import annotations
 
 import datetime as dt
-import math
 import textwrap
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+from typing import TYPE_CHECKING, Unpack
 
-from shaftwork.core.errors import ParameterError
-from shaftwork.equations.spelling import in_text
+from shaftwork.core.errors import ParameterError, ShaftworkError
+from shaftwork.equations.spelling import in_text, stand_ins
 from shaftwork.latex.document import BEGIN, PREAMBLE
-from shaftwork.numerics.tolerances import TYPED
-from shaftwork.pipeline.arguments import Point
 from shaftwork.pipeline.network import Network, network_of
 from shaftwork.reporting import motion_sections, network_sections, vibration_sections
 from shaftwork.reporting.latex_parts import columns, listed, paragraphs
-from shaftwork.reporting.subject import Subject
-from shaftwork.reporting.writers import as_latex, html_page, write_latex, write_pdf
-from shaftwork.results.fatigue import SNLine
+from shaftwork.reporting.report_arguments import (
+    Contents,
+    checked,
+    one_line,
+    refuse_foreign,
+    refuse_unknown,
+    section_names,
+)
+from shaftwork.reporting.subject import ReportSection, Subject
+from shaftwork.reporting.words import as_latex, read
+from shaftwork.reporting.writers import html_page, write_latex, write_pdf
+from shaftwork.results.fatigue import twisted
+from shaftwork.results.plotting import MOST_SIGNALS
 from shaftwork.results.solution import Solution
 from shaftwork.scenes.catalog import LITERATURE, Scene
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from shaftwork.reporting.subject import Picture
 
-    from shaftwork.drawing.canvas import Drawing
-
-SECTIONS: Mapping[str, tuple[str, Callable[[Subject], str]]] = {
+SECTIONS: Mapping[str, tuple[str, Callable[[Subject], ReportSection]]] = {
     "drawing": ("Drive train and circuit", network_sections.drawing),
     "parts": ("Parts and values", network_sections.parts),
-    "assumptions": ("Assumptions", network_sections.assumptions),
+    "assumptions": ("Assumptions", lambda subject: network_sections.assumptions(subject, ())),
     "equations": ("Equations", network_sections.equations),
-    "conditions": ("Initial conditions", motion_sections.conditions),
+    "conditions": ("Initial and operating conditions", motion_sections.conditions),
     "frequencies": ("Natural frequencies", vibration_sections.frequencies),
     "campbell": ("Campbell diagram", vibration_sections.campbell),
     "torsional": ("Torsional vibration", vibration_sections.torsional),
@@ -46,7 +51,7 @@ SECTIONS: Mapping[str, tuple[str, Callable[[Subject], str]]] = {
     "cycles": ("Load cycles and life", motion_sections.cycles),
     "shaft models": ("Models of the shaft compared", vibration_sections.shaft_models),
     "nomenclature": ("Nomenclature", network_sections.nomenclature),
-    "references": ("References", lambda subject: listed(subject.references)),
+    "references": ("References", lambda subject: ReportSection(listed((*subject.references, *_standards(subject))))),
     "model file": ("Model file", network_sections.model_file),
 }
 """What a report can have, in its order, each with its heading."""
@@ -56,11 +61,26 @@ WRITTEN_LAST = "assumptions"
 """They name what could not be computed for the other sections."""
 HEAD = rf"""{PREAMBLE.replace("margin=25mm", "margin=22mm")}
 \usepackage{{float}}
+\floatplacement{{figure}}{{H}}
 \usepackage{{graphicx}}
+\usepackage{{calc}}
+\usepackage[hidelinks]{{hyperref}}
+% a section and a table begin where some rows have room
+\makeatletter
+\newcommand{{\roomfor}}[1]{{\par\if@nobreak\else\ifdim\dimexpr\pagegoal-\pagetotal<#1\relax\newpage\fi\fi}}
+\ifdefined\AddToHook
+\AddToHook{{env/longtable/before}}{{\roomfor{{35mm}}}}
+\AddToHook{{cmd/section/before}}{{\roomfor{{50mm}}}}
+\fi
+\makeatother
 \providecommand{{\tightlist}}{{\setlength{{\itemsep}}{{0pt}}\setlength{{\parskip}}{{0pt}}}}"""
+STANDARDS = {
+    "rainflow": "ASTM E1049-85: Standard practices for cycle counting in fatigue analysis. ASTM International",
+    "torsional": "IACS UR M68: Dimensions of propulsion shafts and their permissible torsional vibration stresses. "
+    "International Association of Classification Societies",
+}
+"""What counts load cycles, and what permits stresses of shafts."""
 FORMATS = ("pdf", "html", "tex")
-MOST_SIGNALS = 12
-"""States drawn when nobody chooses."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +105,7 @@ class Report:
     revision: str
     source: str
     sections: tuple[tuple[str, str], ...]
-    figures: Mapping[str, Figure | Drawing]
+    figures: Mapping[str, Picture]
     curves: Mapping[str, tuple[str, ...]]
     solution: Solution | None
 
@@ -99,7 +119,8 @@ class Report:
         begin = BEGIN.replace(r"\date{}", rf"\date{{{in_text(self.date)}}}")
         title = f"\\title{{{in_text(self.title)}}}\n{author}"
         identity = columns(("Document", ""), rows, (1, 4))
-        return f"{HEAD}\n{title}{begin}\n{identity}\n{body}\n\\end{{document}}\n"
+        letters = stand_ins(f"{title}{begin}{identity}{body}")
+        return f"{HEAD}\n{letters}{title}{begin}\n{identity}\n{body}\n\\end{{document}}\n"
 
     @cached_property
     def html(self) -> str:
@@ -114,53 +135,32 @@ class Report:
         """Write it; the format follows from the end of the name: .pdf, .html, or .tex with its figures beside it.
 
         Raises:
-            ParameterError: another end.
+            ParameterError: another end, or it is in no folder that there is.
+            ShaftworkError: the file cannot be written, as on a full disk.
             MissingExtraError: pandoc, or Typst for PDF, is not installed (extra `report`).
         """
-        path = Path(path)
-        match path.suffix.lower():
-            case ".pdf":
-                write_pdf(self, path)
-            case ".html":
-                path.write_text(self.html, encoding="utf-8")
-            case ".tex":
-                write_latex(self, path)
-            case _:
-                raise ParameterError(f"A report is no '{path.suffix}'. Take .{', .'.join(FORMATS)}.")
+        if not isinstance(path, str | Path):
+            raise ParameterError(f"path = {path!r} must be the name of a file, such as 'report.pdf'.")
+        place = Path(path)
+        ending = place.suffix.lower()
+        if ending.removeprefix(".") not in FORMATS:
+            raise ParameterError(f"A report is no '{place.suffix}'. Take .{', .'.join(FORMATS)}.")
+        if not place.parent.is_dir():
+            raise ParameterError(f"There is no folder '{place.parent}' for '{place.name}'. Make it, or name another.")
+        try:
+            match ending:
+                case ".pdf":
+                    write_pdf(self, place)
+                case ".html":
+                    place.write_text(self.html, encoding="utf-8")
+                case ".tex":
+                    write_latex(self, place)
+        except OSError as error:
+            raise ShaftworkError(f"'{place}' cannot be written: {error}. Make room, or give another name.") from None
 
     def __repr__(self) -> str:
         headings = ", ".join(heading for heading, _ in self.sections)
         return f"Report '{self.title}'\n{textwrap.fill(headings, 100, initial_indent='  ', subsequent_indent='  ')}"
-
-
-class Contents(TypedDict, total=False):
-    """What a report can have besides the network and its motion.
-
-    Args:
-        signals: quantities to draw and to list; by default those of the scene, or the states.
-        phases: combinations of modes whose equations are printed; by default those that last longest.
-        at: the point about which frequencies are computed, as for `Network.modes`.
-        speeds: (k,) rad/s, of a Campbell diagram.
-        orders: its excitations per turn, by default 1, 2 and 3.
-        sn: the S-N line of what is twisted, or one for each quantity.
-        origins: where values come from, by part or by "part.parameter": a column of the table of values.
-        assumptions: what was chosen and why, a sentence each.
-        references: literature, a line each.
-        comparison: of models of a shaft, from `studies.work_precision`.
-        torsional: a torsional vibration calculation.
-    """
-
-    signals: Sequence[str]
-    phases: Sequence[str]
-    at: Point
-    speeds: Sequence[float]
-    orders: Sequence[float]
-    sn: SNLine | Mapping[str, SNLine]
-    origins: Mapping[str, str]
-    assumptions: Sequence[str]
-    references: Sequence[str]
-    comparison: Any
-    torsional: Any
 
 
 def report(
@@ -173,7 +173,7 @@ def report(
     date: str | None = None,
     revision: str = "",
     source: str | None = None,
-    text: Mapping[str, str] | None = None,
+    text: Mapping[str, str | Path] | None = None,
     sections: Sequence[str] | None = None,
     **contents: Unpack[Contents],
 ) -> Report:
@@ -188,12 +188,13 @@ def report(
         date: in words; by default today's.
         revision: of the document.
         source: where the system comes from.
-        text: your own words in Markdown, by section; "introduction" and "conclusions" are sections of their own.
+        text: your own words in Markdown by section, or a `Path` to them; "introduction" and "conclusions" are sections
+            of their own. Pictures are PNG and JPEG files beside the words, or in the current folder.
         sections: those wanted, by name; by default all that have anything to say.
         **contents: what else it has, see `Contents`.
 
     Raises:
-        ParameterError: there is no such section.
+        ParameterError: an argument is not what it must be; the message says what would be right.
         NetworkError, SimulationError: the network cannot be assembled, or its motion failed.
         MissingExtraError: matplotlib is not installed, or pandoc for words in Markdown.
 
@@ -203,23 +204,32 @@ def report(
         Report 'Crane travel drive, start and steady travel'
           Parts and values, Extremes
     """
-    words, wanted = _checked(text or {}, sections)
-    _refuse_wrong(contents)
+    there = (WORDS[0], *SECTIONS, WORDS[1])
+    if text is not None and not isinstance(text, Mapping):
+        raise ParameterError(f"text = {text!r} must say by section, {{'introduction': 'words in Markdown'}}.")
+    section_names("text", tuple(text or ()), there)
+    words = read(text or {})
+    wanted = tuple(SECTIONS) if sections is None else section_names("sections", sections, there)
+    head = {"title": title, "author": author, "date": date, "revision": revision, "source": source}
+    for name, value in head.items():
+        if value is not None:
+            one_line(name, value)
     if solution is not None and t_end is not None:
         raise ParameterError("solution= and t_end= both say how long the motion is. Leave out one of them.")
     scene = subject if isinstance(subject, Scene) else None
-    about = _subject(subject, solution, t_end, source, contents)
+    about = _subject(subject, solution, t_end, source, checked(contents))
     headed = title if title is not None else scene.title if scene else about.network.name
     today = dt.datetime.now().astimezone().date().isoformat()
+    written = _written(about, words, wanted)
     return Report(
         title=headed[:1].upper() + headed[1:],
         author=author,
         date=date if date is not None else today,
         revision=revision,
         source=about.source,
-        sections=tuple(_written(about, words, wanted)),
-        figures=about.figures,
-        curves=about.curves,
+        sections=tuple((heading, section.text) for heading, section in written.items()),
+        figures={name: figure for section in written.values() for name, figure in section.figures.items()},
+        curves={name: signals for section in written.values() for name, signals in section.curves.items()},
         solution=about.solution,
     )
 
@@ -231,10 +241,11 @@ def _subject(
     scene = subject if isinstance(subject, Scene) else None
     network = subject() if isinstance(subject, Scene) else network_of(subject)
     end = t_end if t_end is not None else scene.t_end if scene else None
-    _refuse_foreign(solution, network)
+    if solution is not None:
+        refuse_foreign(solution, network)
+    refuse_unknown(contents.get("origins", {}), network)
     motion = network.simulate(end) if solution is None and end is not None else solution
     origin = source if source is not None else scene.source if scene else ""
-    _refuse_unknown(contents.get("origins", {}), network)
     literature = (full for short, full in LITERATURE.items() if short in origin)
     return Subject(
         network=network,
@@ -254,96 +265,40 @@ def _subject(
     )
 
 
-def _checked(words: Mapping[str, str], sections: Sequence[str] | None) -> tuple[Mapping[str, str], tuple[str, ...]]:
-    """The user's words and the sections wanted.
-
-    Raises:
-        ParameterError: there is no such section.
-    """
-    names = (WORDS[0], *SECTIONS, WORDS[1])
-    if isinstance(sections, str):
-        raise ParameterError(f"sections = {sections!r} must be a list of names, such as [{sections!r}].")
-    for name, said in words.items():
-        if not isinstance(said, str):
-            raise ParameterError(f"text: what is said to {name!r}, {said!r}, must be a text in Markdown.")
-    for argument, chosen in (("text", words), ("sections", sections or ())):
-        for name in chosen:
-            if name not in names:
-                raise ParameterError(f"{argument}: there is no section {name!r}. There are: {', '.join(names)}.")
-    return words, tuple(SECTIONS if sections is None else sections)
-
-
-def _refuse_wrong(contents: Contents) -> None:
-    """Refuse what a report has not, and a text where a list is meant.
-
-    Raises:
-        ParameterError: it is so.
-    """
-    for name, value in contents.items():
-        if name not in Contents.__annotations__:
-            raise ParameterError(f"report: there is no {name!r}. There are: {', '.join(Contents.__annotations__)}.")
-        if name in ("signals", "phases", "assumptions", "references") and isinstance(value, str):
-            raise ParameterError(f"{name} = {value!r} must be a list of texts, such as [{value!r}].")
-
-
-def _refuse_foreign(solution: Solution | None, network: Network) -> None:
-    """Refuse the motion of another network.
-
-    Raises:
-        ParameterError: it has other parts, or other values of their parameters.
-    """
-    if solution is None:
-        return
-    there = {part.name: part.values for part in network.parts}
-    named = {name.rpartition(".") for name in solution.parameters}
-    strange = [part for part, _, _ in named if part not in there]
-    other = [
-        f"{part}.{name}"
-        for part, _, name in named
-        if isinstance(value := there.get(part, {}).get(name), float | int)
-        and not isinstance(value, bool)
-        and not math.isclose(value, solution.parameters[f"{part}.{name}"], rel_tol=TYPED)
-    ]
-    if strange or other:
-        what = f"part '{strange[0]}'" if strange else f"'{min(other)}' has another value"
-        raise ParameterError(
-            f"solution is a motion of another network than '{network.name}': {what}. Give the network that it is of."
-        )
-
-
-def _refuse_unknown(origins: Mapping[str, str], network: Network) -> None:
-    """Refuse an origin of a part or parameter that there is not.
-
-    Raises:
-        ParameterError: there is none of this name.
-    """
-    there = {part.name: [f"{part.name}.{name}" for name in part.declared] for part in network.parts}
-    for name, origin in origins.items():
-        if not isinstance(origin, str):
-            raise ParameterError(f"origins: {origin!r}, where {name!r} comes from, must be a text.")
-        if name not in there and all(name not in parameters for parameters in there.values()):
-            near = there.get(name.rpartition(".")[0]) or list(there)
-            raise ParameterError(f"origins: there is no part or parameter {name!r}. There are: {', '.join(near[:20])}.")
-
-
 def _states(solution: Solution | None) -> tuple[str, ...]:
     """The first states that can be read; of none where there is no motion."""
     names = tuple(name for name in solution.states if name in solution) if solution else ()
     return names[:MOST_SIGNALS]
 
 
-def _written(about: Subject, words: Mapping[str, str], wanted: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Headings and LaTeX of the sections that say anything."""
+def _written(about: Subject, words: Mapping[str, tuple[str, Path]], wanted: Sequence[str]) -> dict[str, ReportSection]:
+    """The sections that say anything, by heading."""
     introduction, conclusions = WORDS
-    order = sorted(SECTIONS, key=lambda name: name == WRITTEN_LAST)
-    written = {name: SECTIONS[name][1](about) if name in wanted else "" for name in order}
-    said = {name: as_latex(text) for name, text in words.items()}
-    if introduction in said:
-        yield introduction.capitalize(), said[introduction]
-    for name, (heading, _) in SECTIONS.items():
-        if name == "nomenclature" and conclusions in said:
-            yield conclusions.capitalize(), said[conclusions]
-        if text := paragraphs(said.get(name, ""), written[name]):
-            yield heading, text
-    if about.notes and WRITTEN_LAST not in wanted:
-        yield "Left out", listed(dict.fromkeys(about.notes))
+    said = {name: ReportSection(*as_latex(name, *text)) for name, text in words.items()}
+    written = {name: SECTIONS[name][1](about) for name in SECTIONS if name in wanted and name != WRITTEN_LAST}
+    notes = [note for section in written.values() for note in section.notes]
+    if WRITTEN_LAST in wanted:
+        written[WRITTEN_LAST] = network_sections.assumptions(about, notes)
+    order = list(SECTIONS)
+    order.insert(order.index("nomenclature"), conclusions)
+    headings = {name: SECTIONS[name][0] if name in SECTIONS else name.capitalize() for name in (introduction, *order)}
+    sections = {
+        heading: _joined(said.get(name, ReportSection()), written.get(name, ReportSection()))
+        for name, heading in headings.items()
+    }
+    if WRITTEN_LAST not in wanted:
+        sections["Left out"] = ReportSection(listed(dict.fromkeys(notes)))
+    return {heading: section for heading, section in sections.items() if section.text}
+
+
+def _standards(subject: Subject) -> Iterator[str]:
+    """Rules and methods that sections refer to."""
+    if subject.solution is not None and twisted(subject.solution.reader):
+        yield STANDARDS["rainflow"]
+    if subject.torsional is not None:
+        yield STANDARDS["torsional"]
+
+
+def _joined(words: ReportSection, section: ReportSection) -> ReportSection:
+    """A section with the words of the user before it."""
+    return replace(section, text=paragraphs(words.text, section.text), figures={**words.figures, **section.figures})

@@ -1,4 +1,4 @@
-"""What a report is about, and what the user says to it."""
+"""What a report is about, and what the user says to it; and what a section of it has."""
 
 from __future__ import annotations
 
@@ -16,12 +16,34 @@ from shaftwork.results.fatigue import SNLine
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from matplotlib.figure import Figure
 
     from shaftwork.drawing.canvas import Drawing
 
+    Picture = Figure | Drawing | Path
+    """What a report can show: a figure, a drawing, or a picture of the user's in a file."""
+
 MOST_PHASES = 6
 """Combinations of modes whose equations are printed when nobody chooses."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReportSection:
+    """What a section says and shows.
+
+    Args:
+        text: in LaTeX; empty where it has nothing to say.
+        figures: pictures by the name under which the text includes them.
+        curves: of those that show the motion, the quantities.
+        notes: what could not be computed, in words.
+    """
+
+    text: str = ""
+    figures: Mapping[str, Picture] = field(default_factory=dict)
+    curves: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,9 +65,6 @@ class Subject:
         references: literature, a line each.
         comparison: of models of a shaft, as `studies.work_precision` makes it.
         torsional: a torsional vibration calculation.
-        notes: what could not be computed, in words; filled while sections are written.
-        figures: pictures by the name under which sections include them; filled while sections are written.
-        curves: of those that show the motion, the quantities; filled while sections are written.
     """
 
     network: Network
@@ -62,9 +81,6 @@ class Subject:
     references: tuple[str, ...]
     comparison: Any
     torsional: Any
-    notes: list[str] = field(default_factory=list)
-    figures: dict[str, Figure | Drawing] = field(default_factory=dict)
-    curves: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     @cached_property
     def equations(self) -> tuple[Equations, ...]:

@@ -2,68 +2,64 @@
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from shaftwork.core.errors import ShaftworkError
+from shaftwork.core.screen import MOST_MODES
 from shaftwork.equations.spelling import in_text
 from shaftwork.latex.nomenclature import breakable
 from shaftwork.reporting.latex_parts import columns, listed, number, paragraphs, picture
-
-if TYPE_CHECKING:
-    from shaftwork.reporting.subject import Subject
+from shaftwork.reporting.subject import ReportSection, Subject
+from shaftwork.results.observer import RPM
 
 HOLZER_MODES = 3
 """Modes in tables of their own, the lowest."""
-MOST_MODES = 30
-"""Modes in the table, the lowest, and resonances: a page."""
 
 
-def frequencies(subject: Subject) -> str:
+def frequencies(subject: Subject) -> ReportSection:
     """Natural frequencies, damping and shapes about the point of the report."""
     try:
         modes = subject.network.modes(subject.at)
     except ShaftworkError as reason:
-        subject.notes.append(f"Natural frequencies are left out: {reason}")
-        return ""
+        return ReportSection(notes=(f"Natural frequencies are left out: {reason}",))
     rows = [
         (in_text(name), number(f), number(60 * f), number(damping, 4), in_text(node))
         for name, f, damping, _, node in modes.table[:MOST_MODES]
     ]
     more = f"The {MOST_MODES} lowest of {len(modes)} modes." if len(modes) > MOST_MODES else ""
-    shapes = ""
-    if (modes.rates.imag > 0).any():
-        subject.figures["modes"] = modes.plot()
-        shapes = picture("modes", "Speeds of the nodes in the lowest modes")
+    swings = bool((modes.rates.imag > 0).any())
+    shapes = picture("modes", "Speeds of the nodes in the lowest modes") if swings else ""
     heads = ("Mode", "Frequency in Hz", "in 1/min", "Damping ratio", "Moves most")
-    return paragraphs(in_text(f"{modes.title}."), in_text(more), columns(heads, rows, (4, 3, 3, 3, 3)), shapes)
+    text = paragraphs(in_text(f"{modes.title}."), in_text(more), columns(heads, rows, (4, 3, 3, 3, 3)), shapes)
+    return ReportSection(text, {"modes": modes.plot()} if swings else {})
 
 
-def campbell(subject: Subject) -> str:
+def campbell(subject: Subject) -> ReportSection:
     """Natural frequencies and orders over the speed, and where they meet."""
     if not len(subject.speeds):
-        return ""
+        return ReportSection()
     try:
-        diagram = subject.network.campbell(subject.speeds, subject.orders, at=subject.at)
+        if subject.torsional is not None:  # it knows the point of each speed
+            diagram = subject.torsional.campbell(subject.orders)
+        else:
+            diagram = subject.network.campbell(subject.speeds, subject.orders, at=subject.at)
     except ShaftworkError as reason:
-        subject.notes.append(f"The Campbell diagram is left out: {reason}")
-        return ""
-    subject.figures["campbell"] = diagram.plot()
+        return ReportSection(notes=(f"The Campbell diagram is left out: {reason}",))
     rows = [
-        (number(one.speed * 30 / math.pi), number(one.order), number(one.frequency), in_text(one.mode))
+        (number(one.speed * RPM), number(one.order), number(one.frequency), in_text(one.mode))
         for one in diagram.crossings
     ]
     heads = ("Speed in 1/min", "Order", "Frequency in Hz", "Mode")
-    return paragraphs(picture("campbell", "Campbell diagram"), columns(heads, rows, (2, 1, 2, 3)))
+    text = paragraphs(picture("campbell", "Campbell diagram"), columns(heads, rows, (2, 1, 2, 3)))
+    return ReportSection(text, {"campbell": diagram.plot()})
 
 
-def torsional(subject: Subject) -> str:
+def torsional(subject: Subject) -> ReportSection:
     """The torsional calculation: vibratory torques and stresses with their limits, barred speeds, modes, heat."""
     calculation = subject.torsional
     if calculation is None:
-        return ""
+        return ReportSection()
     judged = [name for name, shaft in calculation.items() if shaft.limits is not None]
-    subject.figures["torsional"] = calculation.plot(*judged)
     rows = [tuple(map(_limits_in_print, row)) for row in calculation.table]
     heads = tuple(
         _limits_in_print(head if head.startswith("tau_") else head[:1].upper() + head[1:]) for head in calculation.heads
@@ -73,7 +69,7 @@ def torsional(subject: Subject) -> str:
         "largest torque. Torques and stresses are half of peak to peak over a cycle, from all orders with their "
         "phases. Stresses are nominal; permitted ones are those of IACS UR M68."
     )
-    return paragraphs(
+    text = paragraphs(
         _limits_in_print(f"{calculation.heading}. {rule}"),
         columns(heads, rows, (3, *(1.5 for _ in heads[2:]), 4)),
         _with_letters(listed(tuple(map(_with_squares, calculation.notes)))),
@@ -82,6 +78,7 @@ def torsional(subject: Subject) -> str:
         *map(_holzer, calculation.modes[:HOLZER_MODES]),
         _heat(calculation),
     )
+    return ReportSection(text, {"torsional": calculation.plot(*judged)})
 
 
 def _limits_in_print(text: str) -> str:
@@ -118,7 +115,7 @@ def _resonances(calculation: Any) -> str:
     """Where excited orders meet natural frequencies, from the lowest speed on."""
     rows = [
         (
-            number(one.speed * 30 / math.pi),
+            number(one.speed * RPM),
             number(one.order),
             in_text(one.mode),
             number(one.frequency),
@@ -132,16 +129,15 @@ def _resonances(calculation: Any) -> str:
 
 def _heat(calculation: Any) -> str:
     """What parts turn into heat, at the speed at which each does most."""
-    rows = [(breakable(part), number(power), number(speed * 30 / math.pi)) for part, power, speed in calculation.heat]
+    rows = [(breakable(part), number(power), number(speed * RPM)) for part, power, speed in calculation.heat]
     return columns(("Heat of the vibration in", "W, at most", "at 1/min"), rows, (3, 2, 2))
 
 
-def shaft_models(subject: Subject) -> str:
+def shaft_models(subject: Subject) -> ReportSection:
     """Error and run time of models of a shaft."""
     compared = subject.comparison
     if compared is None:
-        return ""
-    subject.figures["shaft-models"] = compared.plot()
+        return ReportSection()
     rows = [
         (
             breakable(trial.model),
@@ -154,8 +150,9 @@ def shaft_models(subject: Subject) -> str:
     ]
     said = f"Errors of the shaft {compared.shaft} are relative to {compared.truth[0]}."
     heads = ("Model", "Engine", "States", "CPU ms", "Largest error")
-    return paragraphs(
+    text = paragraphs(
         in_text(said),
         picture("shaft-models", "Error of models of the shaft against their run time"),
         columns(heads, rows, (3, 2, 2, 2, 2)),
     )
+    return ReportSection(text, {"shaft-models": compared.plot()})

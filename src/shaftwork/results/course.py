@@ -251,6 +251,11 @@ def _first_largest(times: Array, values: Array) -> int:
     return int(values[there].argmax())
 
 
+def first_times(steps: Array) -> Array:
+    """(k,) times at which every quantity between these steps is looked at first."""
+    return np.asarray(LobattoPanels.between(np.unique(steps)).times.ravel())
+
+
 def course(read: Read, steps: Array, *, even: bool = False) -> Course:
     """A quantity as polynomials that are fine where it may be largest or smallest, and rough elsewhere.
 

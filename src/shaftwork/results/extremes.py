@@ -11,7 +11,7 @@ import numpy as np
 from shaftwork.core.errors import AccuracyWarning
 from shaftwork.core.notices import warn
 from shaftwork.numerics.tolerances import GOLDEN
-from shaftwork.results.course import course
+from shaftwork.results.course import course, first_times
 from shaftwork.results.observer import Array, Reader
 
 HIDDEN, STRAYED = 0.05, 0.2
@@ -20,6 +20,8 @@ may miss the quantity. Seven samples in a swing miss a twentieth of it."""
 SHARES = np.arange(1, 9) * GOLDEN % 1
 """Where between its neighbours a time lies: in step with nothing that swings, and few, for engines that take as many
 matrix exponentials as there are distances from a step end."""
+MOST_READ = 4_000_000
+"""Values of several quantities that are read together, 32 MB."""
 MOST_OUTPUTS = 10_000_000
 """Output times that can be asked for."""
 
@@ -102,6 +104,20 @@ class Extremes(Mapping[str, tuple[Extreme, Extreme]]):
             self._rows[name] = self._searched(name)
         return self._rows[name]
 
+    def rows(self, names: Sequence[str]) -> dict[str, ExtremesRow]:
+        """The same of several quantities, which are read together.
+
+        Raises:
+            SignalError: there is no such quantity.
+        """
+        missing = [name for name in dict.fromkeys(names) if name not in self._rows]
+        together = max(1, MOST_READ // (8 * len(self._reader.steps)))
+        for first in range(0, len(missing), together):
+            some = missing[first : first + together]
+            with self._reader.read_ahead(some, first_times(self._reader.steps)):
+                self._rows.update({name: self._searched(name) for name in some})
+        return {name: self._rows[name] for name in names}
+
     def _searched(self, name: str) -> ExtremesRow:
         reader, rows = self._reader, []
         unit, places = reader.unit(name), reader.places(name)
@@ -127,8 +143,7 @@ class Extremes(Mapping[str, tuple[Extreme, Extreme]]):
         width = max((len(name) for name in names), default=0)
         head = f"{'':{width}}  {'unit':8} {'minimum':>12} {'at s':>8} {'maximum':>12} {'at s':>8}"
         lines = [f"{head} {'mean':>12} {'end':>12}"]
-        for name in names:
-            least, most, mean, end = self.row(name)
+        for name, (least, most, mean, end) in self.rows(names).items():
             ends = f"{float(least):z12.5g} {least.t:8.4g} {float(most):z12.5g} {most.t:8.4g}"
             lines.append(f"{name:{width}}  {least.unit:8} {ends} {mean:z12.5g} {end:z12.5g}")
         return "\n".join(lines)

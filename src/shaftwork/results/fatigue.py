@@ -325,11 +325,17 @@ def damages(reader: Reader, sn: SNLine | Mapping[str, SNLine], smallest: float) 
 
 
 def twisted(reader: Reader) -> tuple[str, ...]:
-    """The torques of all that is twisted: springs and gaps have a twist, long shafts a torque along them."""
+    """The torques of all that is twisted: springs and gaps have a twist, long shafts a torque along them.
+
+    What turns with one node, as the torque of an engine does, has a speed of its own and is not twisted.
+    """
     units = reader.observer.units
     parts = dict.fromkeys(name.rpartition(".")[0] for name in units)
     twisted = (
-        part for part in parts if f"{part}.phi_rel" in units or {f"{part}.phi", f"{part}.omega_rel"} <= units.keys()
+        part
+        for part in parts
+        if f"{part}.phi_rel" in units
+        or ({f"{part}.phi", f"{part}.omega_rel"} <= units.keys() and f"{part}.omega" not in units)
     )
     along = (name for name in reader.observer.profiles if name.endswith(".tau"))
     return (*(f"{part}.tau" for part in twisted if f"{part}.tau" in units), *along)

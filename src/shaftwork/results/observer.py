@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import reprlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cached_property
 from typing import Any, NamedTuple, Protocol
 
@@ -157,6 +158,7 @@ class Reader:
     def __init__(self, title: str, states: tuple[str, ...], observer: Observer, dense: DenseStates) -> None:
         self.title, self.states, self.observer, self.dense = title, states, observer, dense
         self._states_at: tuple[Array, Array] | None = None
+        self._ahead: dict[str, tuple[Array, Array]] = {}
         self._profile: tuple[str, Array, Array] | None = None
         self.unbounded: dict[tuple[str, int | None], dict[float, float]] = {}
         """Values that are not finite, by the name of the quantity and its place, and by time in s."""
@@ -232,6 +234,9 @@ class Reader:
         """
 
         def plain(times: Array) -> Array:
+            if name in self._ahead and np.array_equal(self._ahead[name][0], times):
+                ahead = self._ahead[name][1]
+                return (ahead if place is None else ahead[:, place]).copy()
             parts = blocks(len(times), len(self.states))
             with muted(*((AccuracyWarning,) if (name, place) in self.unbounded else ())):  # it has been said
                 return np.concatenate([self._at(name, place, times[block]) for block in parts])
@@ -246,6 +251,24 @@ class Reader:
             return values
 
         return read
+
+    @contextmanager
+    def read_ahead(self, names: Sequence[str], times: Array) -> Iterator[None]:
+        """Meanwhile quantities are read at these times (k,) from values computed together.
+
+        Every quantity of a motion is looked at on the same times first; what all branches bear there is computed once.
+        """
+        width = max(1, len(self.states), len(self.observer.units))
+        ahead: dict[str, list[Array]] = {name: [] for name in names if name not in self.states}
+        for block in blocks(len(times), width) if len(ahead) > 1 else ():
+            t, x = times[block], self.dense(times[block])
+            for name, values in ahead.items():
+                values.append(self.values(name, t, x))
+        self._ahead = {name: (times, np.concatenate(values)) for name, values in ahead.items() if values}
+        try:
+            yield
+        finally:
+            self._ahead = {}
 
     def _at(self, name: str, place: int | None, times: Array) -> Array:
         if self._states_at is None or not np.array_equal(self._states_at[0], times):
