@@ -20,7 +20,7 @@ from shaftwork.reporting.latex_parts import columns, listed, paragraphs
 from shaftwork.reporting.report_arguments import (
     Contents,
     checked,
-    one_line,
+    checked_head,
     refuse_foreign,
     refuse_unknown,
     section_names,
@@ -57,6 +57,7 @@ SECTIONS: Mapping[str, tuple[str, Callable[[Subject], ReportSection]]] = {
 """What a report can have, in its order, each with its heading."""
 WORDS = ("introduction", "conclusions")
 """Sections that are the user's words alone: the first one, and the one before the nomenclature."""
+_PLACES = (WORDS[0], *SECTIONS, WORDS[1])
 WRITTEN_LAST = "assumptions"
 """They name what could not be computed for the other sections."""
 HEAD = rf"""{PREAMBLE.replace("margin=25mm", "margin=22mm")}
@@ -204,27 +205,25 @@ def report(
         Report 'Crane travel drive, start and steady travel'
           Parts and values, Extremes
     """
-    there = (WORDS[0], *SECTIONS, WORDS[1])
-    if text is not None and not isinstance(text, Mapping):
-        raise ParameterError(f"text = {text!r} must say by section, {{'introduction': 'words in Markdown'}}.")
-    section_names("text", tuple(text or ()), there)
-    words = read(text or {})
-    wanted = tuple(SECTIONS) if sections is None else section_names("sections", sections, there)
-    head = {"title": title, "author": author, "date": date, "revision": revision, "source": source}
-    for name, value in head.items():
-        if value is not None:
-            one_line(name, value)
+    words = _words(text)
+    wanted = tuple(SECTIONS) if sections is None else section_names("sections", sections, _PLACES)
+    checked_head(title=title, author=author, date=date, revision=revision, source=source)
     if solution is not None and t_end is not None:
         raise ParameterError("solution= and t_end= both say how long the motion is. Leave out one of them.")
-    scene = subject if isinstance(subject, Scene) else None
     about = _subject(subject, solution, t_end, source, checked(contents))
-    headed = title if title is not None else scene.title if scene else about.network.name
-    today = dt.datetime.now().astimezone().date().isoformat()
+    by_default = subject.title if isinstance(subject, Scene) else about.network.name
     written = _written(about, words, wanted)
+    return _document(about, written, by_default if title is None else title, author, date, revision)
+
+
+def _document(
+    about: Subject, written: Mapping[str, ReportSection], title: str, author: str, date: str | None, revision: str
+) -> Report:
+    today = dt.datetime.now().astimezone().date().isoformat()
     return Report(
-        title=headed[:1].upper() + headed[1:],
+        title=title[:1].upper() + title[1:],
         author=author,
-        date=date if date is not None else today,
+        date=today if date is None else date,
         revision=revision,
         source=about.source,
         sections=tuple((heading, section.text) for heading, section in written.items()),
@@ -232,6 +231,14 @@ def report(
         curves={name: signals for section in written.values() for name, signals in section.curves.items()},
         solution=about.solution,
     )
+
+
+def _words(text: Mapping[str, str | Path] | None) -> dict[str, tuple[str, Path]]:
+    """The user's own words by section."""
+    if text is not None and not isinstance(text, Mapping):
+        raise ParameterError(f"text = {text!r} must say by section, {{'introduction': 'words in Markdown'}}.")
+    section_names("text", tuple(text or ()), _PLACES)
+    return read(text or {})
 
 
 def _subject(

@@ -109,15 +109,15 @@ def texts(name: str, values: Any) -> tuple[str, ...]:
     return listed
 
 
-def one_line(name: str, value: Any) -> str:
-    """A text for the head of a document.
+def checked_head(**head: Any) -> None:
+    """Refuse what is no text in the head of a document.
 
     Raises:
-        ParameterError: it is none.
+        ParameterError: a value is neither a text nor left out.
     """
-    if not isinstance(value, str):
-        raise ParameterError(f"{name} = {value!r} must be a text.")
-    return value
+    for name, value in head.items():
+        if value is not None and not isinstance(value, str):
+            raise ParameterError(f"{name} = {value!r} must be a text.")
 
 
 def section_names(argument: str, names: Any, there: Sequence[str]) -> tuple[str, ...]:
