@@ -28,10 +28,11 @@ class Element:
         symbol: of its own part, where it has the name of that.
         kind: what its law is.
         value: capacity, stiffness or conductance; of a law or source the number or expression of what
-            passes, or is across.
+            passes, or is across; None of what passes one way alone.
         terms: of a coupling the factor of each term; else (1,).
         edges: its keys in the graph, one for each term.
         ends: the names of the nodes of each term.
+        back: what passes backward, where that is another law; else None.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Element:
     terms: tuple[float, ...]
     edges: tuple[Edge, ...]
     ends: tuple[tuple[str, str], ...]
+    back: Any = None
 
 
 class ElementNames:
@@ -79,12 +81,16 @@ class ElementNames:
                 continue
             template = self._graph.branches[index].template
             letter = template.symbols[0].name if len(template.symbols) == 1 else template.label or str(place + 1)
-            name, count = f"{part.name} {letter}", 1
-            while name in self._taken:
-                count += 1
-                name = f"{part.name} {letter} {count}"
-            self._taken.add(name)
-            yield name
+            yield self.unique(f"{part.name} {letter}")
+
+    def unique(self, name: str) -> str:
+        """A name, or one with a number where that is taken; it is taken from then on."""
+        count, first = 1, name
+        while name in self._taken:
+            count += 1
+            name = f"{first} {count}"
+        self._taken.add(name)
+        return name
 
 
 def is_linear(part: GraphPart, graph: CircuitGraph) -> bool:
@@ -118,6 +124,6 @@ FIRST = (Kind.COUPLING, Kind.ACROSS_SOURCE, Kind.THROUGH_SOURCE)
 
 def in_numbers(law: Expr, branch: GraphBranch, graph: CircuitGraph) -> Expr:
     """A law with the values of its parameters."""
-    owner = graph.parts[branch.part].name
-    values = {symbol: Float(graph.parameters[f"{owner}.{symbol.name}"]) for symbol in branch.template.symbols}
-    return replaced(law, values)
+    part = graph.parts[branch.part]
+    symbols = (symbol for symbol in law.free_symbols if symbol.name in part.parameters)
+    return replaced(law, {symbol: Float(graph.parameters[f"{part.name}.{symbol.name}"]) for symbol in symbols})

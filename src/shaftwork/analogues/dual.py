@@ -6,33 +6,39 @@ import dataclasses
 from collections.abc import Iterator, Sequence
 
 from shaftwork.analogues.analogy import Analogy
-from shaftwork.analogues.circuit_elements import Edge, Element, ElementNames, Sum, elements_of, in_numbers, is_linear
+from shaftwork.analogues.circuit_elements import Edge, Element, ElementNames, Sum, elements_of, in_numbers
 from shaftwork.analogues.faces import DualEnds, Kuratowski, dual_ends
 from shaftwork.analogues.readings import EdgeReading, Readings, sums_of_nodes, total
 from shaftwork.analogues.rigid_joints import RigidJoints
 from shaftwork.components.base import Component
+from shaftwork.analogues.dual_modes import DualModes
+from shaftwork.components.branches import ACROSS, INTEGRAL, RATE
 from shaftwork.components.electrical import (
     Capacitor,
     CurrentSource,
+    Diode,
     Inductor,
     Resistor,
     Transformer,
     VoltageSource,
 )
+from shaftwork.components.laws import i, q, replaced
 from shaftwork.core.errors import Diagnostic, NetworkError
-from shaftwork.formulation.form import StateForm
-from shaftwork.network.graph import CircuitGraph, GraphPart, ends_of
+from shaftwork.formulation.form import StateForm, integral_name, state_form
+from shaftwork.network.graph import CircuitGraph, GraphPart, build_graph, ends_of
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed, listed, title
 
 OTHERWISE = "Take net.circuit(), which every network has"
-
+READ = {ACROSS: i, INTEGRAL: q}
+"""What laws of branches read, in quantities of their duals."""
 
 RANKS = {
     Kind.THROUGH_STORE: 0,
     Kind.COUPLING: 1,
     Kind.ACROSS_SOURCE: 2,
     Kind.THROUGH_SOURCE: 2,
+    Kind.LAW: 2,
     Kind.CONDUCTANCE: 3,
     Kind.ACROSS_STORE: 4,
 }
@@ -49,17 +55,17 @@ def dual(netlist: Netlist, form: StateForm) -> Analogy:
     Raises:
         NetworkError: a part has no dual, or the graph is not planar.
     """
-    graph = form.graph
     title_of_error = f"'{netlist.name}' has no dual"
-    if problems := tuple(_without_dual(part, graph) for part in graph.parts if not _has_dual(part, graph)):
+    reasons = ((part, _reason(part, form.graph)) for part in form.graph.parts)
+    if problems := tuple(_without_dual(part, why, form.graph) for part, why in reasons if why):
         raise NetworkError(title_of_error, problems)
-    names = ElementNames(graph)
-    idle = frozenset(form.tree.links[Kind.COUPLING])  # of gears side by side all but one, which carry nothing
+    choices = {part.name: (DualModes(part).choice,) for part in form.graph.parts if part.modes}
+    if choices:  # a part that is open in its first mode has a place in the graph of another one
+        form = state_form(build_graph(netlist.with_choices(choices)))
+    graph, names = form.graph, ElementNames(form.graph)
+    idle = frozenset(_idle(form))
     elements = [
-        element
-        for part in graph.parts
-        for element in elements_of(part, graph, names)
-        if element.edges[0][0] not in idle
+        element for part in graph.parts for element in _elements(part, graph, names) if element.edges[0][0] not in idle
     ]
     ends = {key: (plus, minus) for branch in graph.branches for key, plus, minus in ends_of(branch)}
     joints = RigidJoints(elements, ends)
@@ -67,7 +73,7 @@ def dual(netlist: Netlist, form: StateForm) -> Analogy:
     faces = dual_ends({edge: joints.nodes(edge) for edge in joints.free([*ranks])}, ranks)
     if isinstance(faces, Kuratowski):
         raise NetworkError(title_of_error, (_not_planar(faces, graph),))
-    work = _Dual(faces)
+    work = _Dual(faces, names)
     placed = [item for element in elements for item in work.placed(element)]
     changed = dataclasses.replace(netlist, name=f"dual of {netlist.name}", placed=tuple(placed), ports=())
     return Analogy(netlist.name, changed, _quantities(form, elements, joints, work.edges), work.branches)
@@ -92,10 +98,34 @@ def _quantities(
         edges[joint] = EdgeReading({}, joints.through(joint, edges))
         _add_loops(owner[joint], edges)
     nodes = sums_of_nodes(form.graph, edges)
-    for index in form.tree.links[Kind.COUPLING]:
+    for index in _idle(form):
         for key, plus, minus in ends_of(form.graph.branches[index]):
             edges[key] = EdgeReading(total((1.0, nodes[plus]), (-1.0, nodes[minus])), {})
-    return Readings(form, edges, nodes).quantities()
+    angles = ((integral_name(form.graph, form.graph.branches[k]), edges[k, 0].across) for k in form.integrals)
+    charges = {name: {f"{one.removesuffix('.i')}.q": share for one, share in sums.items()} for name, sums in angles}
+    return Readings(form, edges, nodes).quantities() | charges
+
+
+def _idle(form: StateForm) -> Iterator[int]:
+    """Of gears side by side all but one, which carry nothing."""
+    return (index for index in form.tree.links[Kind.COUPLING] if not form.graph.part_of(index).modes)
+
+
+def _elements(part: GraphPart, graph: CircuitGraph, names: ElementNames) -> Iterator[Element]:
+    """The elements of a part, with the laws of all its modes."""
+    modes = DualModes(part) if part.modes else None
+    for place, element in enumerate(elements_of(part, graph, names)):
+        if modes is None:
+            yield element
+        elif modes.is_one_way:
+            yield dataclasses.replace(element, kind=Kind.LAW, value=None)
+        else:
+            branch = graph.branches[part.branches[place]]
+            value, *back = (in_numbers(law, branch, graph) for law in modes.laws(place))
+            changes = bool(back) or part.modes[0].law is not None
+            yield dataclasses.replace(element, kind=Kind.LAW, value=value, back=back[0] if back else None) if (
+                changes
+            ) else element
 
 
 def _add_loops(element: Element, edges: dict[Edge, EdgeReading]) -> None:
@@ -106,34 +136,24 @@ def _add_loops(element: Element, edges: dict[Edge, EdgeReading]) -> None:
             edges.setdefault(edge, EdgeReading({}, total((factor / factors[base], edges[base].through))))
 
 
-def _has_dual(part: GraphPart, graph: CircuitGraph) -> bool:
-    return is_linear(part, graph) and not _drives(part, graph)
-
-
-def _drives(part: GraphPart, graph: CircuitGraph) -> bool:
-    """Whether a part has a damping below zero, which is no resistance."""
-    branches = (graph.branches[index] for index in part.branches)
-    laws = (in_numbers(one.template.law, one, graph) for one in branches if one.template.kind is Kind.CONDUCTANCE)
-    return any(law < 0 for law in laws)
-
-
-def _without_dual(part: GraphPart, graph: CircuitGraph) -> Diagnostic:
-    """Why a part has no dual."""
+def _reason(part: GraphPart, graph: CircuitGraph) -> str:
+    """Why a part has no dual; empty where it has one."""
     templates = [graph.branches[index].template for index in part.branches]
-    if part.modes:
-        why = "it changes its mode"
-    elif any(template.line is not None for template in templates):
-        why = "waves travel along it; Lumped(20) instead of Wave() has one"
-    elif any(template.reads for template in templates):
-        why = "its laws read other nodes and branches"
-    elif any(template.through for template in templates):
-        why = "it loses power in its teeth"
-    elif _drives(part, graph):
-        why = "its torque rises with its speed"
-    else:
-        why = "its law is not linear"
+    if any(template.line is not None for template in templates):
+        return "waves travel along it; Lumped(20) instead of Wave() has one"
+    if any(RATE in template.reads for template in templates):
+        return "what it stores changes, and inductances are constant"
+    if any(template.reads for template in templates):
+        return "its laws read other nodes and branches, and those of a dual their own current alone"
+    if any(template.through for template in templates):
+        return "it loses power in its teeth, by the direction in which that goes"
+    return f"it {why}" if part.modes and (why := DualModes(part).problem) else ""
+
+
+def _without_dual(part: GraphPart, why: str, graph: CircuitGraph) -> Diagnostic:
+    """The problem of a part that has no dual."""
     nodes = tuple(graph.node_name(number) for number in dict.fromkeys(part.nodes.values()))
-    message = f"{title(part.component)}: {why}, and duals are of stores, dampers, gears and sources over time."
+    message = f"{title(part.component)}: {why}."
     return Diagnostic("no dual", message, f"{OTHERWISE}.", (part.name,), nodes)
 
 
@@ -150,8 +170,8 @@ def _not_planar(why: Kuratowski, graph: CircuitGraph) -> Diagnostic:
 class _Dual:
     """Puts the duals of elements at the faces, and remembers what is read of each edge."""
 
-    def __init__(self, faces: DualEnds) -> None:
-        self._faces = faces
+    def __init__(self, faces: DualEnds, names: ElementNames) -> None:
+        self._faces, self._names = faces, names
         self.edges: dict[Edge, EdgeReading] = {}
         self.branches: dict[str, int] = {}
 
@@ -159,11 +179,18 @@ class _Dual:
         """The parts that are the dual of an element."""
         if element.kind is Kind.COUPLING:
             yield from self._coupling(element)
+        elif element.value is None:
+            (edge,) = element.edges
+            yield Placed(Diode(element.name, symbol=element.symbol), self._nodes(edge)[::-1])
+            self.edges[edge] = EdgeReading({f"{element.name}.i": -1.0}, {f"{element.name}.u": -1.0})
+        elif element.back is not None:
+            yield from self._rubbing(element)
         else:
             (edge,) = element.edges
             left, right = self._nodes(edge)
-            is_source = element.kind in (Kind.ACROSS_SOURCE, Kind.THROUGH_SOURCE)
-            yield Placed(_made(element), (right, left) if is_source else (left, right))
+            made = _made(element)
+            is_source = isinstance(made, VoltageSource | CurrentSource)
+            yield Placed(made, (right, left) if is_source else (left, right))
             name, sign = element.name, -1.0 if is_source else 1.0
             self.branches[name] = edge[0]
             self.edges[edge] = EdgeReading({f"{name}.i": 1.0}, {f"{name}.u": sign})
@@ -194,6 +221,27 @@ class _Dual:
         currents = total(*((1.0, {f"{name}.i_1": 1.0}) for name in names))
         self.edges[first] = EdgeReading(currents, {f"{names[0]}.u_1": 1.0})
 
+    def _rubbing(self, element: Element) -> Iterator[Placed]:
+        """Two diodes, each of which opens at a voltage of its own."""
+        (edge,) = element.edges
+        left, right = self._nodes(edge)
+        currents: Sum = {}
+        for side, (start, end), law, sign in (
+            ("forward", (left, right), element.value, 1.0),
+            ("backward", (right, left), element.back, -1.0),
+        ):
+            name = self._names.unique(f"{element.name} {side}")
+            diode = self._names.unique(f"{element.name} diode {side}")
+            yield Placed(Diode(diode), (start, diode))
+            # the law is that of a current from left to right
+            law = replaced(law, {**READ, ACROSS: i if sign > 0 else -i})
+            yield Placed(VoltageSource(name, u=-sign * law), (end, diode))
+            currents[f"{name}.i"] = sign
+            if sign > 0:
+                voltage = {f"{diode}.u": 1.0, f"{name}.u": -1.0}
+        self.branches[element.name] = edge[0]
+        self.edges[edge] = EdgeReading(currents, voltage)
+
     def _nodes(self, edge: Edge) -> tuple[str, str]:
         left, right = self._faces.ends[edge]
         return _node(left), _node(right)
@@ -211,10 +259,12 @@ def _made(element: Element) -> Component:
             return Inductor(name, symbol=symbol, L=value)
         case Kind.THROUGH_STORE:
             return Capacitor(name, symbol=symbol, C=1 / value)
+        case Kind.CONDUCTANCE if value < 0:  # it drives
+            return VoltageSource(name, symbol=symbol, u=-value * i)
         case Kind.CONDUCTANCE:
             return Resistor(name, symbol=symbol, R=value)
         case Kind.ACROSS_SOURCE:
             return CurrentSource(name, symbol=symbol, i=value)
         case Kind.THROUGH_SOURCE | Kind.LAW:
-            return VoltageSource(name, symbol=symbol, u=-value)
+            return VoltageSource(name, symbol=symbol, u=-value if isinstance(value, float) else -replaced(value, READ))
     raise AssertionError(f"{element.kind} of '{name}' has no dual element")  # pragma: no cover

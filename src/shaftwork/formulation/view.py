@@ -148,6 +148,7 @@ def controlled_problems(view: View) -> Iterator[Diagnostic]:
     yield from dict.fromkeys(unknown)  # one cause for all windings of a motor
     for law in view.form.controlled:
         yield from _beside_a_store(view, law)
+        yield from _by_its_current(view, law)
 
 
 def _unknown(view: View, law: int, reading: Reading) -> Iterator[Diagnostic]:
@@ -189,3 +190,23 @@ def _beside_a_store(view: View, law: int) -> Iterator[Diagnostic]:
         )
         hint = f"Put a {words.loss} or {words.spring} between the two."
         yield Diagnostic("controlled source", message, hint, view.parts((law, *stores)), view.ends(stores))
+
+
+def _by_its_current(view: View, law: int) -> Iterator[Diagnostic]:
+    """A current that a law reads, and that follows at the same instant from what the law gives."""
+    currents = {each.of for each in readings_of(view.graph, law).values() if each.kind == "through"}
+    through = currents.intersection(view.tree.tree[Kind.ACROSS_SOURCE])
+    balances = view.tree.cutsets.items() if through else ()
+    answering = [
+        link
+        for link, balance in balances
+        if not through.isdisjoint(balance) and view.kind(link) in (Kind.ACROSS_STORE, Kind.CONDUCTANCE, Kind.LAW)
+    ]
+    if answering:
+        words = view.words(law)
+        message = (
+            f"{view.titles((law,))} prescribes a {words.across} by a {words.through} that {view.titles(answering)} "
+            "answers at the same instant."
+        )
+        hint = f"It needs a series {words.spring}, so that its {words.through} is a state."
+        yield Diagnostic("controlled source", message, hint, view.parts((law, *answering)), view.ends((law,)))

@@ -281,8 +281,7 @@ class Network(NetworkBuilder):
         """
         from shaftwork.analogues.dual import dual
 
-        netlist = self.expanded().netlist()
-        return self._of_analogy(dual(netlist, sound(netlist)))
+        return self._of_analogy(dual(self.netlist(), sound(self.netlist())))
 
     @staticmethod
     def _of_analogy(analogy: Analogy) -> Network:
@@ -319,7 +318,7 @@ class Network(NetworkBuilder):
 
         refuse_analogy(analogy, as_circuit=as_circuit)
         if analogy == "force-voltage":
-            dual, equations = self.dual(), self.equations(expand=True, phase=phase)
+            dual, equations = self.expanded().dual(), self.equations(expand=True, phase=phase)
             return dual_picture(equations, dual.graph(), {} if dual.analogy is None else dual.analogy.branches, values)
         equations = self.equations(expand=expand, phase=phase)
         in_phase = None if phase is None else (self.graph(), phase)

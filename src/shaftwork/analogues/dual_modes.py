@@ -1,0 +1,114 @@
+"""Parts that change their mode, as elements of a dual: pairs of laws for what rubs, one law for what touches."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+from sympy import Expr, Integer, Or, Piecewise
+from sympy.logic.boolalg import Boolean
+
+from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, readings_in
+from shaftwork.components.laws import t as TIME
+from shaftwork.components.modes import ANEW, Mode, ModeChoice, Modes
+from shaftwork.network.graph import GraphPart, resolve
+from shaftwork.network.templates import make_template
+
+
+@dataclass(frozen=True)
+class DualModes:
+    """The modes of a part as a dual has them.
+
+    What rubs is stuck, which in the dual is a contact that is open up to a voltage on either side: two diodes, each with
+    a source of the voltage at which it opens. What holds one way is a diode, and flanks that spring back have one law.
+
+    Args:
+        part: a part with modes.
+    """
+
+    part: GraphPart
+
+    @cached_property
+    def _modes(self) -> Modes:
+        return self.part.modes[0]
+
+    @cached_property
+    def _joined(self) -> tuple[Mode, ...]:
+        return tuple(mode for mode in self._modes.options if mode.form != self._modes.options[0].form)
+
+    @cached_property
+    def is_one_way(self) -> bool:
+        """Whether it is a diode or a freewheel."""
+        options = self._modes.options
+        return len(options) == 2 and len(self._joined) == 1 and self._joined[0].leaves[0].when == -THROUGH
+
+    @cached_property
+    def _slipping(self) -> tuple[str, ...]:
+        """The modes of what rubs in which it slips forward and backward."""
+        sides = sorted(self._joined[0].gives_way, reverse=True) if len(self._joined) == 1 else []
+        return tuple(to for _, to in sides) if [side for side, _ in sides] == [1.0, -1.0] else ()
+
+    @cached_property
+    def _off(self) -> tuple[Mode, ...]:
+        """The modes of what rubs in which it does not: before and after its time."""
+        names = (*self._slipping, *(mode.name for mode in self._joined))
+        return tuple(mode for mode in self._modes.options if mode.name not in names)
+
+    @cached_property
+    def rubs(self) -> bool:
+        """Whether it is a friction or a brake."""
+        return bool(self._slipping)
+
+    @cached_property
+    def problem(self) -> str:
+        """Why it has no dual, the rest of a sentence that begins with "it"; empty where it has one."""
+        if len(self.part.modes) > 1:
+            return "changes its modes in several places"
+        if self._modes.law is not None or self.is_one_way:
+            return ""
+        if not self.rubs:
+            return "changes its mode by other rules than frictions, freewheels and gaps with springs do"
+        if any(mode.at_rest is not None for mode in self._modes.options):
+            return "holds more than it rubs with at any speed"
+        if any(not _by_time(mode) for mode in self._off):
+            return "comes on by a law, and not at a time that is known before"
+        if any(law.has(INTEGRAL) or readings_in(law) for laws in self._pairs for law in laws):
+            return "rubs by its angle"
+        return ""
+
+    @property
+    def choice(self) -> ModeChoice:
+        """The form in which it has a branch, which stands for it in the graph, and the number in its laws there."""
+        if self._modes.law is not None or self.is_one_way:
+            mode = next(mode for mode in self._modes.options if mode.value)
+        else:
+            mode = self._modes[self._slipping[0]]
+        return ModeChoice(mode.form, mode.value)
+
+    def laws(self, place: int) -> tuple[Expr, ...]:
+        """The law of a branch, by its place in the part: one, or two where it is another forward and backward."""
+        if self._modes.law is not None:
+            return (self._modes.law,)
+        ahead, back = self._pairs[place]
+        if ahead == back:
+            return (ahead,)
+        off = Or(*(mode.starts for mode in self._off))
+        return tuple(Piecewise((Integer(0), off), (law, True)) if self._off else law for law in (ahead, back))
+
+    @cached_property
+    def _pairs(self) -> tuple[tuple[Expr, Expr], ...]:
+        """The laws of all branches while it slips forward and backward."""
+        values = resolve(self.part.component)[0]
+        modes = [self._modes[name] for name in self._slipping]
+        choices = ((ModeChoice(mode.form, mode.value),) for mode in modes)
+        ahead, back = (make_template(self.part.component, values, choice).branches for choice in choices)
+        return tuple((first.law, second.law) for first, second in zip(ahead, back, strict=True))
+
+
+def _by_time(mode: Mode) -> bool:
+    """Whether a mode begins and ends at times that are known before, and nothing passes in it."""
+    conditions: Iterator[Expr | Boolean] = (mode.starts, *(leave.when for leave in mode.leaves))  # type: ignore[assignment]
+    moves = any(one.has(ACROSS, INTEGRAL, THROUGH) or readings_in(one) for one in conditions)
+    straight = all(leave.when.diff(TIME).is_number for leave in mode.leaves if leave.to == ANEW)
+    return not moves and straight and mode.value == 0
