@@ -76,13 +76,14 @@ def dual(netlist: Netlist, form: StateForm) -> Analogy:
     work = _Dual(faces, names)
     placed = [item for element in elements for item in work.placed(element)]
     changed = dataclasses.replace(netlist, name=f"dual of {netlist.name}", placed=tuple(placed), ports=())
-    return Analogy(netlist.name, changed, _quantities(form, elements, joints, work.edges), work.branches)
+    quantities, profiles = _quantities(form, elements, joints, work.edges)
+    return Analogy(netlist.name, changed, quantities, work.branches, profiles=profiles, form=form)
 
 
 def _quantities(
     form: StateForm, elements: Sequence[Element], joints: RigidJoints, edges: dict[Edge, EdgeReading]
-) -> dict[str, Sum]:
-    """What each quantity of the network is in the dual.
+) -> tuple[dict[str, Sum], dict[str, tuple[Sum, ...]]]:
+    """What each quantity of the network is in the dual, and each that is read along a part.
 
     Args:
         form: the state form of the network.
@@ -101,9 +102,13 @@ def _quantities(
     for index in _idle(form):
         for key, plus, minus in ends_of(form.graph.branches[index]):
             edges[key] = EdgeReading(total((1.0, nodes[plus]), (-1.0, nodes[minus])), {})
+    for part in form.graph.parts:  # where modes are pieces of one law, that stands for all branches
+        first, *others = part.branches if part.modes and part.modes[0].law is not None else (0,)
+        edges.update(((other, 0), EdgeReading(edges[first, 0].across, {})) for other in others)
     angles = ((integral_name(form.graph, form.graph.branches[k]), edges[k, 0].across) for k in form.integrals)
     charges = {name: {f"{one.removesuffix('.i')}.q": share for one, share in sums.items()} for name, sums in angles}
-    return Readings(form, edges, nodes).quantities() | charges
+    readings = Readings(form, edges, nodes)
+    return readings.quantities() | charges, readings.profiles()
 
 
 def _idle(form: StateForm) -> Iterator[int]:
@@ -113,19 +118,18 @@ def _idle(form: StateForm) -> Iterator[int]:
 
 def _elements(part: GraphPart, graph: CircuitGraph, names: ElementNames) -> Iterator[Element]:
     """The elements of a part, with the laws of all its modes."""
-    modes = DualModes(part) if part.modes else None
-    for place, element in enumerate(elements_of(part, graph, names)):
-        if modes is None:
-            yield element
-        elif modes.is_one_way:
-            yield dataclasses.replace(element, kind=Kind.LAW, value=None)
-        else:
-            branch = graph.branches[part.branches[place]]
-            value, *back = (in_numbers(law, branch, graph) for law in modes.laws(place))
-            changes = bool(back) or part.modes[0].law is not None
-            yield dataclasses.replace(element, kind=Kind.LAW, value=value, back=back[0] if back else None) if (
-                changes
-            ) else element
+    elements = elements_of(part, graph, names)
+    if not part.modes:
+        yield from elements
+    elif (modes := DualModes(part)).is_one_way:
+        yield dataclasses.replace(next(elements), kind=Kind.LAW, value=None)
+    elif (law := part.modes[0].law) is not None:
+        value = in_numbers(law, graph.branches[part.branches[0]], graph)
+        yield dataclasses.replace(next(elements), kind=Kind.LAW, value=value)
+    else:
+        for element, pair in zip(elements, modes.pairs, strict=True):
+            ahead, back = (in_numbers(law, graph.branches[element.edges[0][0]], graph) for law in pair)
+            yield element if ahead == back else dataclasses.replace(element, kind=Kind.LAW, value=ahead, back=back)
 
 
 def _add_loops(element: Element, edges: dict[Edge, EdgeReading]) -> None:
@@ -197,7 +201,7 @@ class _Dual:
         for edge in element.edges:
             if edge in self._faces.bridges:
                 number = f" {edge[1] + 1}" if len(element.edges) > 1 else ""
-                yield Placed(Resistor(f"{element.name} short{number}", R=0.0), self._nodes(edge))
+                yield Placed(Resistor(self._names.unique(f"{element.name} short{number}"), R=0.0), self._nodes(edge))
 
     def _coupling(self, element: Element) -> Iterator[Placed]:
         """Transformers from one term of a coupling to each other one.
@@ -209,7 +213,8 @@ class _Dual:
         if len(sides) < 2:
             return
         (first, base), *others = sides
-        names = [element.name if len(others) == 1 else f"{element.name} {number}" for number in range(1, len(sides))]
+        numbers = () if len(others) == 1 else range(1, len(sides))
+        names = [self._names.unique(f"{element.name} {number}") for number in numbers] or [element.name]
         self.branches |= dict.fromkeys(names, first[0])
         for name, (edge, factor) in zip(names, others, strict=True):
             sign = 1.0 if base / factor > 0 else -1.0
@@ -234,13 +239,12 @@ class _Dual:
             diode = self._names.unique(f"{element.name} diode {side}")
             yield Placed(Diode(diode), (start, diode))
             # the law is that of a current from left to right
-            law = replaced(law, {**READ, ACROSS: i if sign > 0 else -i})
-            yield Placed(VoltageSource(name, u=-sign * law), (end, diode))
+            voltage = -replaced(law, READ) if sign > 0 else replaced(law, {ACROSS: -i})
+            yield Placed(VoltageSource(name, u=voltage), (end, diode))
             currents[f"{name}.i"] = sign
-            if sign > 0:
-                voltage = {f"{diode}.u": 1.0, f"{name}.u": -1.0}
+            voltages = {f"{diode}.u": sign, f"{name}.u": -sign}  # the same on both sides
         self.branches[element.name] = edge[0]
-        self.edges[edge] = EdgeReading(currents, voltage)
+        self.edges[edge] = EdgeReading(currents, voltages)
 
     def _nodes(self, edge: Edge) -> tuple[str, str]:
         left, right = self._faces.ends[edge]

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
-from sympy import Expr, Integer, Or, Piecewise
+from sympy import Expr, Integer, Or, Piecewise, false
 from sympy.logic.boolalg import Boolean
 
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, readings_in
@@ -73,7 +73,7 @@ class DualModes:
             return "holds more than it rubs with at any speed"
         if any(not _by_time(mode) for mode in self._off):
             return "comes on by a law, and not at a time that is known before"
-        if any(law.has(INTEGRAL) or readings_in(law) for laws in self._pairs for law in laws):
+        if any(law.has(INTEGRAL) or readings_in(law) for laws in self.pairs for law in laws):
             return "rubs by its angle"
         return ""
 
@@ -86,24 +86,19 @@ class DualModes:
             mode = self._modes[self._slipping[0]]
         return ModeChoice(mode.form, mode.value)
 
-    def laws(self, place: int) -> tuple[Expr, ...]:
-        """The law of a branch, by its place in the part: one, or two where it is another forward and backward."""
-        if self._modes.law is not None:
-            return (self._modes.law,)
-        ahead, back = self._pairs[place]
-        if ahead == back:
-            return (ahead,)
-        off = Or(*(mode.starts for mode in self._off))
-        return tuple(Piecewise((Integer(0), off), (law, True)) if self._off else law for law in (ahead, back))
-
     @cached_property
-    def _pairs(self) -> tuple[tuple[Expr, Expr], ...]:
-        """The laws of all branches while it slips forward and backward."""
+    def pairs(self) -> tuple[tuple[Expr, Expr], ...]:
+        """For each branch of what rubs its laws forward and backward, which are zero while it does not rub."""
         values = resolve(self.part.component)[0]
         modes = [self._modes[name] for name in self._slipping]
         choices = ((ModeChoice(mode.form, mode.value),) for mode in modes)
         ahead, back = (make_template(self.part.component, values, choice).branches for choice in choices)
-        return tuple((first.law, second.law) for first, second in zip(ahead, back, strict=True))
+        off = Or(*(mode.starts for mode in self._off))
+
+        def timed(law: Expr) -> Expr:
+            return law if off == false else Piecewise((Integer(0), off), (law, True))
+
+        return tuple((timed(first.law), timed(second.law)) for first, second in zip(ahead, back, strict=True))
 
 
 def _by_time(mode: Mode) -> bool:
