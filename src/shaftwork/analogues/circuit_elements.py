@@ -105,7 +105,9 @@ def is_linear(part: GraphPart, graph: CircuitGraph) -> bool:
 def elements_of(part: GraphPart, graph: CircuitGraph, names: ElementNames) -> Iterator[Element]:
     """The elements of a part, in the order of its branches; a coupling or a source has the name of the part."""
     branches = [graph.branches[index] for index in part.branches]
-    first = next((place for place, branch in enumerate(branches) if branch.template.kind in FIRST), 0)
+    named = [place for place, branch in enumerate(branches) if branch.template.kind in FIRST]
+    geared = (place for place in named if len(branches[place].terms) > 1)  # not a resistance that is zero
+    first = next(geared, named[0] if named else 0)
     for name, branch in zip(names.of_branches(part, first), branches, strict=True):
         keys, ends = [], []
         for key, plus, minus in ends_of(branch):

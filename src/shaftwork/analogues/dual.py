@@ -5,13 +5,15 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Sequence
 
+from sympy import Expr
+
 from shaftwork.analogues.analogy import Analogy
 from shaftwork.analogues.circuit_elements import Edge, Element, ElementNames, Sum, elements_of, in_numbers
+from shaftwork.analogues.dual_modes import DualModes
 from shaftwork.analogues.faces import DualEnds, Kuratowski, dual_ends
 from shaftwork.analogues.readings import EdgeReading, Readings, sums_of_nodes, total
 from shaftwork.analogues.rigid_joints import RigidJoints
 from shaftwork.components.base import Component
-from shaftwork.analogues.dual_modes import DualModes
 from shaftwork.components.branches import ACROSS, INTEGRAL, RATE
 from shaftwork.components.electrical import (
     Capacitor,
@@ -22,7 +24,7 @@ from shaftwork.components.electrical import (
     Transformer,
     VoltageSource,
 )
-from shaftwork.components.laws import i, q, replaced
+from shaftwork.components.laws import i, psi, q, replaced, u
 from shaftwork.core.errors import Diagnostic, NetworkError
 from shaftwork.formulation.form import StateForm, integral_name, state_form
 from shaftwork.network.graph import CircuitGraph, GraphPart, build_graph, ends_of
@@ -32,6 +34,8 @@ from shaftwork.network.netlist import REFERENCE, Netlist, Placed, listed, title
 OTHERWISE = "Take net.circuit(), which every network has"
 READ = {ACROSS: i, INTEGRAL: q}
 """What laws of branches read, in quantities of their duals."""
+BACK = {i: u, q: psi}
+"""What laws of a source of voltage read, in quantities of their duals."""
 
 RANKS = {
     Kind.THROUGH_STORE: 0,
@@ -105,6 +109,10 @@ def _quantities(
     for part in form.graph.parts:  # where modes are pieces of one law, that stands for all branches
         first, *others = part.branches if part.modes and part.modes[0].law is not None else (0,)
         edges.update(((other, 0), EdgeReading(edges[first, 0].across, {})) for other in others)
+        if _of_current(part) is not None and len(part.branches) > 1:
+            counted, store = part.branches[1:]
+            for branch, sign in ((counted, -1.0), (store, 1.0)):
+                edges[branch, 0] = EdgeReading({f"{part.name}.psi": 1.0}, {f"{part.name}.u": sign})
     angles = ((integral_name(form.graph, form.graph.branches[k]), edges[k, 0].across) for k in form.integrals)
     charges = {name: {f"{one.removesuffix('.i')}.q": share for one, share in sums.items()} for name, sums in angles}
     readings = Readings(form, edges, nodes)
@@ -119,12 +127,14 @@ def _idle(form: StateForm) -> Iterator[int]:
 def _elements(part: GraphPart, graph: CircuitGraph, names: ElementNames) -> Iterator[Element]:
     """The elements of a part, with the laws of all its modes."""
     elements = elements_of(part, graph, names)
-    if not part.modes:
+    if (law := _of_current(part)) is not None:
+        yield dataclasses.replace(next(elements), value=law)
+    elif not part.modes:
         yield from elements
     elif (modes := DualModes(part)).is_one_way:
         yield dataclasses.replace(next(elements), kind=Kind.LAW, value=None)
-    elif (law := part.modes[0].law) is not None:
-        value = in_numbers(law, graph.branches[part.branches[0]], graph)
+    elif (whole := part.modes[0].law) is not None:
+        value = in_numbers(whole, graph.branches[part.branches[0]], graph)
         yield dataclasses.replace(next(elements), kind=Kind.LAW, value=value)
     else:
         for element, pair in zip(elements, modes.pairs, strict=True):
@@ -140,6 +150,12 @@ def _add_loops(element: Element, edges: dict[Edge, EdgeReading]) -> None:
             edges.setdefault(edge, EdgeReading({}, total((factor / factors[base], edges[base].through))))
 
 
+def _of_current(part: GraphPart) -> Expr | None:
+    """The law of a source of voltage that reads its own current."""
+    law = part.component.values["u"] if isinstance(part.component, VoltageSource) else None
+    return law if isinstance(law, Expr) and law.has(i, q) else None
+
+
 def _reason(part: GraphPart, graph: CircuitGraph) -> str:
     """Why a part has no dual; empty where it has one."""
     templates = [graph.branches[index].template for index in part.branches]
@@ -147,7 +163,7 @@ def _reason(part: GraphPart, graph: CircuitGraph) -> str:
         return "waves travel along it; Lumped(20) instead of Wave() has one"
     if any(RATE in template.reads for template in templates):
         return "what it stores changes, and inductances are constant"
-    if any(template.reads for template in templates):
+    if any(template.reads for template in templates) and _of_current(part) is None:
         return "its laws read other nodes and branches, and those of a dual their own current alone"
     if any(template.through for template in templates):
         return "it loses power in its teeth, by the direction in which that goes"
@@ -237,10 +253,10 @@ class _Dual:
         ):
             name = self._names.unique(f"{element.name} {side}")
             diode = self._names.unique(f"{element.name} diode {side}")
-            yield Placed(Diode(diode), (start, diode))
+            yield Placed(Diode(diode), (start, f"{name} node"))
             # the law is that of a current from left to right
             voltage = -replaced(law, READ) if sign > 0 else replaced(law, {ACROSS: -i})
-            yield Placed(VoltageSource(name, u=voltage), (end, diode))
+            yield Placed(VoltageSource(name, u=voltage), (end, f"{name} node"))
             currents[f"{name}.i"] = sign
             voltages = {f"{diode}.u": sign, f"{name}.u": -sign}  # the same on both sides
         self.branches[element.name] = edge[0]
@@ -268,7 +284,7 @@ def _made(element: Element) -> Component:
         case Kind.CONDUCTANCE:
             return Resistor(name, symbol=symbol, R=value)
         case Kind.ACROSS_SOURCE:
-            return CurrentSource(name, symbol=symbol, i=value)
+            return CurrentSource(name, symbol=symbol, i=value if isinstance(value, float) else replaced(value, BACK))
         case Kind.THROUGH_SOURCE | Kind.LAW:
             return VoltageSource(name, symbol=symbol, u=-value if isinstance(value, float) else -replaced(value, READ))
     raise AssertionError(f"{element.kind} of '{name}' has no dual element")  # pragma: no cover

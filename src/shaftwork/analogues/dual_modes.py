@@ -20,8 +20,9 @@ from shaftwork.network.templates import make_template
 class DualModes:
     """The modes of a part as a dual has them.
 
-    What rubs is stuck, which in the dual is a contact that is open up to a voltage on either side: two diodes, each with
-    a source of the voltage at which it opens. What holds one way is a diode, and flanks that spring back have one law.
+    What rubs holds up to a torque. In the dual that is a contact, open up to a voltage: two diodes, one for each side,
+    each with a source of the voltage at which it conducts. What holds one way is a diode, and flanks that spring back
+    have one law.
 
     Args:
         part: a part with modes.

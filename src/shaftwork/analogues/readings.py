@@ -71,7 +71,7 @@ class Readings:
         }
 
     def _along(self, part: GraphPart, kind: str, place: str) -> Sum:
-        """What a profile is made of: an across variable of a node, what a part takes in at a port or through a branch."""
+        """What is across a node, what a part takes in at a port, or what passes through a branch."""
         if kind == "across":
             return self._nodes[part.nodes[place]]
         if place in part.nodes:
