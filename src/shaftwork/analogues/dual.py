@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
-from sympy import Expr
+from sympy import Expr, S
 
 from shaftwork.analogues.analogy import Analogy
 from shaftwork.analogues.circuit_elements import Edge, Element, ElementNames, Sum, elements_of, in_numbers
+from shaftwork.analogues.dual_friction import held_twice, side_by_side
 from shaftwork.analogues.dual_modes import DualModes
 from shaftwork.analogues.faces import DualEnds, Kuratowski, dual_ends
 from shaftwork.analogues.readings import EdgeReading, Readings, sums_of_nodes, total
@@ -26,7 +27,7 @@ from shaftwork.components.electrical import (
 )
 from shaftwork.components.laws import i, psi, q, replaced, u
 from shaftwork.core.errors import Diagnostic, NetworkError
-from shaftwork.formulation.form import StateForm, integral_name, state_form
+from shaftwork.formulation.form import Names, StateForm, integral_name, state_form
 from shaftwork.network.graph import CircuitGraph, GraphPart, build_graph, ends_of
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed, listed, title
@@ -68,11 +69,14 @@ def dual(netlist: Netlist, form: StateForm) -> Analogy:
         form = state_form(build_graph(netlist.with_choices(choices)))
     graph, names = form.graph, ElementNames(form.graph)
     idle = frozenset(_idle(form))
-    elements = [
+    elements: Sequence[Element] = [
         element for part in graph.parts for element in _elements(part, graph, names) if element.edges[0][0] not in idle
     ]
     ends = {key: (plus, minus) for branch in graph.branches for key, plus, minus in ends_of(branch)}
     joints = RigidJoints(elements, ends)
+    elements, shared = side_by_side(elements, joints)
+    if problems := tuple(held_twice(netlist, form, shared)):
+        raise NetworkError(title_of_error, problems)
     ranks = {edge: RANKS[element.kind] for element in elements for edge in element.edges}
     faces = dual_ends({edge: joints.nodes(edge) for edge in joints.free([*ranks])}, ranks)
     if isinstance(faces, Kuratowski):
@@ -80,12 +84,16 @@ def dual(netlist: Netlist, form: StateForm) -> Analogy:
     work = _Dual(faces, names)
     placed = [item for element in elements for item in work.placed(element)]
     changed = dataclasses.replace(netlist, name=f"dual of {netlist.name}", placed=tuple(placed), ports=())
-    quantities, profiles = _quantities(form, elements, joints, work.edges)
+    quantities, profiles = _quantities(form, elements, joints, work.edges, shared)
     return Analogy(netlist.name, changed, quantities, work.branches, profiles=profiles, form=form)
 
 
 def _quantities(
-    form: StateForm, elements: Sequence[Element], joints: RigidJoints, edges: dict[Edge, EdgeReading]
+    form: StateForm,
+    elements: Sequence[Element],
+    joints: RigidJoints,
+    edges: dict[Edge, EdgeReading],
+    shared: Mapping[Edge, tuple[Edge, float]],
 ) -> tuple[dict[str, Sum], dict[str, tuple[Sum, ...]]]:
     """What each quantity of the network is in the dual, and each that is read along a part.
 
@@ -94,7 +102,10 @@ def _quantities(
         elements: of the network, without couplings that carry nothing.
         joints: its rigid joints.
         edges: what is read of the edges that have a dual; of the others it is added here.
+        shared: frictions that are part of others; how these share what holds nothing tells.
     """
+    for edge, (first, sign) in shared.items():
+        edges[edge] = EdgeReading(total((sign, edges[first].across)), {})
     couplings = [element for element in elements if element.kind is Kind.COUPLING]
     owner = {edge: element for element in couplings for edge in element.edges}
     for element in couplings:
@@ -116,7 +127,14 @@ def _quantities(
     angles = ((integral_name(form.graph, form.graph.branches[k]), edges[k, 0].across) for k in form.integrals)
     charges = {name: {f"{one.removesuffix('.i')}.q": share for one, share in sums.items()} for name, sums in angles}
     readings = Readings(form, edges, nodes)
-    return readings.quantities() | charges, readings.profiles()
+    sharing = {form.graph.part_of(branch).name for pair in shared.items() for branch, _ in (pair[0], pair[1][0])}
+    through = {
+        name
+        for name, (part, signal) in Names(form).signals.items()
+        if part.name in sharing and signal.kind == "through"
+    }
+    quantities = {name: sums for name, sums in readings.quantities().items() if name not in through}
+    return quantities | charges, readings.profiles()
 
 
 def _idle(form: StateForm) -> Iterator[int]:
@@ -199,6 +217,8 @@ class _Dual:
         """The parts that are the dual of an element."""
         if element.kind is Kind.COUPLING:
             yield from self._coupling(element)
+        elif element.edges[0] not in self._faces.ends:
+            yield from self._at_rest(element)
         elif element.value is None:
             (edge,) = element.edges
             yield Placed(Diode(element.name, symbol=element.symbol), self._nodes(edge)[::-1])
@@ -241,6 +261,19 @@ class _Dual:
             self.edges[edge] = EdgeReading({f"{name}.i_2": sign}, {f"{name}.u_2": sign})
         currents = total(*((1.0, {f"{name}.i_1": 1.0}) for name in names))
         self.edges[first] = EdgeReading(currents, {f"{names[0]}.u_1": 1.0})
+
+    def _at_rest(self, element: Element) -> Iterator[Placed]:
+        """A source between nodes that are one, which is of no effect: it feeds a resistor of its own."""
+        (edge,) = element.edges
+        self.edges[edge] = EdgeReading({}, {})
+        if element.kind not in (Kind.THROUGH_SOURCE, Kind.LAW) or element.value is None or element.back is not None:
+            return
+        law = element.value
+        still = law if isinstance(law, float) else replaced(law, {ACROSS: S.Zero, INTEGRAL: S.Zero})
+        node = f"{element.name} node"
+        yield Placed(_made(dataclasses.replace(element, value=still)), (node, REFERENCE))
+        yield Placed(Resistor(self._names.unique(f"{element.name} alone"), R=1.0), (node, REFERENCE))
+        self.edges[edge] = EdgeReading({}, {f"{element.name}.u": -1.0})
 
     def _rubbing(self, element: Element) -> Iterator[Placed]:
         """Two diodes, each of which opens at a voltage of its own."""

@@ -79,6 +79,16 @@ class DualModes:
         return ""
 
     @property
+    def holds(self) -> bool:
+        """Whether it holds rigidly in one of its modes."""
+        return bool(self._joined)
+
+    @property
+    def holding(self) -> ModeChoice:
+        """The form in which it holds."""
+        return ModeChoice(self._joined[0].form, self._joined[0].value)
+
+    @property
     def choice(self) -> ModeChoice:
         """The form in which it has a branch, which stands for it in the graph, and the number in its laws there."""
         if self._modes.law is not None or self.is_one_way:
