@@ -68,6 +68,11 @@ class ElementNames:
             return f"{owner} {inner}"
         return f"{name} node" if self._elsewhere.get(name, {number}) != {number} else name
 
+    def mesh(self, number: int) -> str:
+        """The name of a node of the dual; number 0 is its reference."""
+        name = f"mesh {number}"
+        return REFERENCE if number == 0 else f"{name} node" if name in self._taken else name
+
     def of_branches(self, part: GraphPart, kept: int) -> Iterator[str]:
         """A name for each branch of a part: its own for one of them, with the letter of the law behind it for others.
 

@@ -65,17 +65,17 @@ def dual(netlist: Netlist, form: StateForm) -> Analogy:
     if problems := tuple(_without_dual(part, why, form.graph) for part, why in reasons if why):
         raise NetworkError(title_of_error, problems)
     choices = {part.name: (DualModes(part).choice,) for part in form.graph.parts if part.modes}
-    if choices:  # a part that is open in its first mode has a place in the graph of another one
-        form = state_form(build_graph(netlist.with_choices(choices)))
-    graph, names = form.graph, ElementNames(form.graph)
-    idle = frozenset(_idle(form))
+    # a part that is open in its first mode has a place in the graph of another one
+    closed = state_form(build_graph(netlist.with_choices(choices))) if choices else form
+    graph, names = closed.graph, ElementNames(closed.graph)
+    idle = frozenset(_idle(closed))
     elements: Sequence[Element] = [
         element for part in graph.parts for element in _elements(part, graph, names) if element.edges[0][0] not in idle
     ]
     ends = {key: (plus, minus) for branch in graph.branches for key, plus, minus in ends_of(branch)}
     joints = RigidJoints(elements, ends)
-    elements, shared = side_by_side(elements, joints)
-    if problems := tuple(held_twice(netlist, form, shared)):
+    elements, shared = side_by_side(elements, ends)
+    if problems := tuple(held_twice(netlist, closed, shared)):
         raise NetworkError(title_of_error, problems)
     ranks = {edge: RANKS[element.kind] for element in elements for edge in element.edges}
     faces = dual_ends({edge: joints.nodes(edge) for edge in joints.free([*ranks])}, ranks)
@@ -84,7 +84,7 @@ def dual(netlist: Netlist, form: StateForm) -> Analogy:
     work = _Dual(faces, names)
     placed = [item for element in elements for item in work.placed(element)]
     changed = dataclasses.replace(netlist, name=f"dual of {netlist.name}", placed=tuple(placed), ports=())
-    quantities, profiles = _quantities(form, elements, joints, work.edges, shared)
+    quantities, profiles = _quantities(closed, elements, joints, work.edges, shared)
     return Analogy(netlist.name, changed, quantities, work.branches, profiles=profiles, form=form)
 
 
@@ -106,6 +106,8 @@ def _quantities(
     """
     for edge, (first, sign) in shared.items():
         edges[edge] = EdgeReading(total((sign, edges[first].across)), {})
+    for part in form.graph.parts:
+        _add_others(part, edges)
     couplings = [element for element in elements if element.kind is Kind.COUPLING]
     owner = {edge: element for element in couplings for edge in element.edges}
     for element in couplings:
@@ -117,13 +119,6 @@ def _quantities(
     for index in _idle(form):
         for key, plus, minus in ends_of(form.graph.branches[index]):
             edges[key] = EdgeReading(total((1.0, nodes[plus]), (-1.0, nodes[minus])), {})
-    for part in form.graph.parts:  # where modes are pieces of one law, that stands for all branches
-        first, *others = part.branches if part.modes and part.modes[0].law is not None else (0,)
-        edges.update(((other, 0), EdgeReading(edges[first, 0].across, {})) for other in others)
-        if _of_current(part) is not None and len(part.branches) > 1:
-            counted, store = part.branches[1:]
-            for branch, sign in ((counted, -1.0), (store, 1.0)):
-                edges[branch, 0] = EdgeReading({f"{part.name}.psi": 1.0}, {f"{part.name}.u": sign})
     angles = ((integral_name(form.graph, form.graph.branches[k]), edges[k, 0].across) for k in form.integrals)
     charges = {name: {f"{one.removesuffix('.i')}.q": share for one, share in sums.items()} for name, sums in angles}
     readings = Readings(form, edges, nodes)
@@ -166,6 +161,16 @@ def _add_loops(element: Element, edges: dict[Edge, EdgeReading]) -> None:
     if (base := next((edge for edge in element.edges if edge in edges), None)) is not None:
         for edge, factor in factors.items():
             edges.setdefault(edge, EdgeReading({}, total((factor / factors[base], edges[base].through))))
+
+
+def _add_others(part: GraphPart, edges: dict[Edge, EdgeReading]) -> None:
+    """The branches of a part beside the one that stands for all of them."""
+    first, *others = part.branches or (0,)
+    if part.modes and part.modes[0].law is not None:
+        edges.update({(index, 0): EdgeReading(edges[first, 0].across, {}) for index in others})
+    elif _of_current(part) is not None:  # what counts its charge
+        for index, sign in zip(others, (-1.0, 1.0), strict=False):
+            edges[index, 0] = EdgeReading({f"{part.name}.psi": 1.0}, {f"{part.name}.u": sign})
 
 
 def _of_current(part: GraphPart) -> Expr | None:
@@ -297,11 +302,7 @@ class _Dual:
 
     def _nodes(self, edge: Edge) -> tuple[str, str]:
         left, right = self._faces.ends[edge]
-        return _node(left), _node(right)
-
-
-def _node(face: int) -> str:
-    return f"mesh {face}" if face else REFERENCE
+        return self._names.mesh(left), self._names.mesh(right)
 
 
 def _made(element: Element) -> Component:

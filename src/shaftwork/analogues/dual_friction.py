@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from shaftwork.analogues.circuit_elements import Edge, Element
 from shaftwork.analogues.dual_modes import DualModes
-from shaftwork.analogues.rigid_joints import RigidJoints
 from shaftwork.components.branches import ACROSS
 from shaftwork.components.laws import replaced
 from shaftwork.core.errors import Diagnostic
@@ -18,13 +17,13 @@ from shaftwork.network.netlist import Netlist, listed, title
 
 
 def side_by_side(
-    elements: Sequence[Element], joints: RigidJoints
+    elements: Sequence[Element], nodes_of: Mapping[Edge, tuple[int, int]]
 ) -> tuple[tuple[Element, ...], Mapping[Edge, tuple[Edge, float]]]:
     """The elements, with frictions between the same two nodes as one: in the dual two open contacts would be in series.
 
     Args:
         elements: of the network.
-        joints: its rigid joints.
+        nodes_of: first and second node of each edge.
 
     Returns:
         The elements, and for each friction that is part of another one the edge of that, and the sign of its own.
@@ -33,13 +32,13 @@ def side_by_side(
     places: dict[tuple[int, ...], int] = {}
     shared: dict[Edge, tuple[Edge, float]] = {}
     for element in elements:
-        nodes = joints.nodes(element.edges[0])
+        nodes = nodes_of[element.edges[0]]
         place = places.setdefault(tuple(sorted(nodes)), len(results)) if element.back is not None else len(results)
         if place == len(results):
             results.append(element)
             continue
         first = results[place]
-        along = joints.nodes(first.edges[0]) == nodes
+        along = nodes_of[first.edges[0]] == nodes
         ahead, back = element.value, element.back
         if not along:
             ahead, back = (-replaced(law, {ACROSS: -ACROSS}) for law in (back, ahead))
