@@ -315,8 +315,10 @@ class Quantities:
         law = self.own_law(branch.index)
         if branch.template.kind is Kind.ACROSS_SOURCE and law.is_Symbol and law.name in self.graph.parameters:
             return law
-        quantity = self.domain((branch.plus, branch.minus)).across
-        return self._named(branch.part, quantity, branch.template.label.removeprefix(f"{quantity.name}_"))
+        domain, label = self.domain((branch.plus, branch.minus)), branch.template.label
+        of_source = branch.template.kind is Kind.ACROSS_SOURCE and label == domain.through.name
+        ending = "" if of_source else label.removeprefix(f"{domain.across.name}_")
+        return self._named(branch.part, domain.across, ending)
 
     def _named(self, part: int, quantity: Quantity, label: str) -> Symbol:
         """The symbol "part.quantity", or "quantity(part)" where a parameter of the part has taken that name."""
@@ -377,6 +379,8 @@ class Quantities:
 
     def _label(self, branch: GraphBranch) -> str:
         template, siblings = branch.template, self.graph.parts[branch.part].branches
+        if template.kind is Kind.ACROSS_SOURCE and template.label == ELECTRICAL.through.name:
+            return ""  # its current, which a law reads, is that of the part
         if template.label:
             return template.label
         names = [symbol.name for symbol in template.symbols]
