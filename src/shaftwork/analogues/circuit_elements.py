@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -119,8 +119,7 @@ def elements_of(part: GraphPart, graph: CircuitGraph, names: ElementNames) -> It
             keys.append(key)
             ends.append((names.node(plus), names.node(minus)))
         factors = tuple(float(in_numbers(factor, branch, graph)) for factor, _, _ in branch.terms) or (1.0,)
-        law = in_numbers(branch.template.law, branch, graph)
-        value = float(law) if law.is_number else law
+        value = in_numbers(branch.template.law, branch, graph)
         symbol = part.component.symbol if name == part.name else None
         yield Element(name, symbol, branch.template.kind, value, factors, tuple(keys), tuple(ends))
 
@@ -129,8 +128,14 @@ FIRST = (Kind.COUPLING, Kind.ACROSS_SOURCE, Kind.THROUGH_SOURCE)
 """Kinds of elements that have the name of their part where it has several elements."""
 
 
-def in_numbers(law: Expr, branch: GraphBranch, graph: CircuitGraph) -> Expr:
-    """A law with the values of its parameters."""
+def in_numbers(law: Expr, branch: GraphBranch, graph: CircuitGraph) -> Any:
+    """A law with the values of its parameters, or the number that it is."""
     part = graph.parts[branch.part]
     symbols = (symbol for symbol in law.free_symbols if symbol.name in part.parameters)
-    return replaced(law, {symbol: Float(graph.parameters[f"{part.name}.{symbol.name}"]) for symbol in symbols})
+    value = replaced(law, {symbol: Float(graph.parameters[f"{part.name}.{symbol.name}"]) for symbol in symbols})
+    return float(value) if value.is_number else value
+
+
+def in_letters(value: Any, letters: Mapping[Any, Any]) -> Any:
+    """A number, or a law with other letters."""
+    return value if isinstance(value, float) else replaced(value, letters)

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from sympy import Expr, S
 
 from shaftwork.analogues.analogy import Analogy
-from shaftwork.analogues.circuit_elements import Edge, Element, ElementNames, Sum, elements_of, in_numbers
+from shaftwork.analogues.circuit_elements import Edge, Element, ElementNames, Sum, elements_of, in_letters, in_numbers
 from shaftwork.analogues.dual_friction import held_twice, side_by_side
 from shaftwork.analogues.dual_modes import DualModes
 from shaftwork.analogues.faces import DualEnds, Kuratowski, dual_ends
@@ -25,7 +25,7 @@ from shaftwork.components.electrical import (
     Transformer,
     VoltageSource,
 )
-from shaftwork.components.laws import i, psi, q, replaced, u
+from shaftwork.components.laws import i, psi, q, u
 from shaftwork.core.errors import Diagnostic, NetworkError
 from shaftwork.formulation.form import Names, StateForm, integral_name, state_form
 from shaftwork.network.graph import CircuitGraph, GraphPart, build_graph, ends_of
@@ -273,8 +273,7 @@ class _Dual:
         self.edges[edge] = EdgeReading({}, {})
         if element.kind not in (Kind.THROUGH_SOURCE, Kind.LAW) or element.value is None or element.back is not None:
             return
-        law = element.value
-        still = law if isinstance(law, float) else replaced(law, {ACROSS: S.Zero, INTEGRAL: S.Zero})
+        still = in_letters(element.value, {ACROSS: S.Zero, INTEGRAL: S.Zero})
         node = f"{element.name} node"
         yield Placed(_made(dataclasses.replace(element, value=still)), (node, REFERENCE))
         yield Placed(Resistor(self._names.unique(f"{element.name} alone"), R=1.0), (node, REFERENCE))
@@ -293,7 +292,7 @@ class _Dual:
             diode = self._names.unique(f"{element.name} diode {side}")
             yield Placed(Diode(diode), (start, f"{name} node"))
             # the law is that of a current from left to right
-            voltage = -replaced(law, READ) if sign > 0 else replaced(law, {ACROSS: -i})
+            voltage = -in_letters(law, READ) if sign > 0 else in_letters(law, {ACROSS: -i})
             yield Placed(VoltageSource(name, u=voltage), (end, f"{name} node"))
             currents[f"{name}.i"] = sign
             voltages = {f"{diode}.u": sign, f"{name}.u": -sign}  # the same on both sides
@@ -318,7 +317,7 @@ def _made(element: Element) -> Component:
         case Kind.CONDUCTANCE:
             return Resistor(name, symbol=symbol, R=value)
         case Kind.ACROSS_SOURCE:
-            return CurrentSource(name, symbol=symbol, i=value if isinstance(value, float) else replaced(value, BACK))
+            return CurrentSource(name, symbol=symbol, i=in_letters(value, BACK))
         case Kind.THROUGH_SOURCE | Kind.LAW:
-            return VoltageSource(name, symbol=symbol, u=-value if isinstance(value, float) else -replaced(value, READ))
+            return VoltageSource(name, symbol=symbol, u=-in_letters(value, READ))
     raise AssertionError(f"{element.kind} of '{name}' has no dual element")  # pragma: no cover

@@ -5,10 +5,9 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 
-from shaftwork.analogues.circuit_elements import Edge, Element
+from shaftwork.analogues.circuit_elements import Edge, Element, in_letters
 from shaftwork.analogues.dual_modes import DualModes
 from shaftwork.components.branches import ACROSS
-from shaftwork.components.laws import replaced
 from shaftwork.core.errors import Diagnostic
 from shaftwork.formulation.form import StateForm, state_form
 from shaftwork.network.graph import build_graph
@@ -41,7 +40,7 @@ def side_by_side(
         along = nodes_of[first.edges[0]] == nodes
         ahead, back = element.value, element.back
         if not along:
-            ahead, back = (-replaced(law, {ACROSS: -ACROSS}) for law in (back, ahead))
+            ahead, back = (-in_letters(law, {ACROSS: -ACROSS}) for law in (back, ahead))
         results[place] = dataclasses.replace(first, value=first.value + ahead, back=first.back + back)
         shared[element.edges[0]] = first.edges[0], 1.0 if along else -1.0
     return tuple(results), shared

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from sympy import And, Expr, Heaviside, Integer, Not, Piecewise, Rational, cos, pi, sin, sqrt
 
-from shaftwork.components.base import Component, Port, Role, Signal, component, default_signals, refuse_no_time_on
+from shaftwork.components.base import Component, Port, Role, Signal, component, refuse_no_time_on
 from shaftwork.components.branches import (
     ACROSS,
     INTEGRAL,
@@ -113,11 +113,6 @@ class VoltageSource(Component):
     def inner_ports(self) -> tuple[Port, ...]:
         """The charge, where the law reads it: the voltage of a capacitor of 1 F that carries the current."""
         return (Port("charge", ELECTRICAL),) if isinstance(self.u, Expr) and self.u.has(q) else ()
-
-    def signals(self) -> dict[str, Signal]:
-        """Voltage and current, and the charge where the law reads it."""
-        charge = {"q": Signal("across", ("charge", None), ELECTRICAL)} if self.inner_ports() else {}
-        return default_signals(self) | charge
 
     def branches(self, p: Any) -> Iterator[Branch]:
         yield AcrossLaw(p.u, label="i" if readings_in(as_expression(p.u)) else "")
