@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 import sympy
 
 import shaftwork as sw
+from shaftwork.components.friction import rubbing, rubs
 from shaftwork.scenes import SCENES
 from tests.analogues.test_circuits import LONG, TIMES, same_motion, two_masses
 from tests.beds import bed_of, registered
@@ -189,6 +191,43 @@ def train_that_rubs() -> sw.Network:
     net.add(sw.DryFriction("friction", tau_c=3.0, tau_s=5.0), "a")
     net.add(sw.Brake("brake", tau=sw.Table([0, 3], [0, 4]), t_on=0.5, t_off=2.5), "c")
     return net
+
+
+@sw.component
+class Jamming(sw.Component):
+    """Holds twice as much as it rubs with."""
+
+    tau: float = sw.parameter("N*m", "torque while it slips")
+
+    role: ClassVar[Any] = "loss"
+    ports: ClassVar = (sw.Port("a"),)
+
+    def modes(self, p: Any) -> Iterator[sw.Modes]:
+        yield rubbing(2 * p.tau)
+
+    def branches(self, p: Any) -> Iterator[Any]:
+        yield rubs(p.mode * p.tau, p, None)
+
+
+def test_a_part_that_holds_otherwise_than_diodes_do_has_no_dual() -> None:
+    net = two_masses()
+    net.add(Jamming("jam", tau=2.0), "output")
+    with pytest.raises(sw.NetworkError, match="holds up to another torque than it rubs with as it begins to slip"):
+        net.dual()
+
+
+@pytest.mark.parametrize(
+    "start",
+    [
+        {"J1.omega": 5.0, "J2.omega": -3.0, "J3.omega": -3.0, "J4.omega": 2.0},
+        {"J1.omega": 2.0, "J2.omega": 2.0, "J3.omega": 2.0, "J4.omega": 2.0, "claws.phi": 0.2, "shaft.phi": -0.1},
+    ],
+    ids=["apart", "together"],
+)
+@pytest.mark.slow
+def test_a_dual_starts_in_the_modes_of_its_network(start: dict[str, float]) -> None:
+    net = train_that_rubs()
+    same_motion(net, np.linspace(0.0, 1.0, 11), of=net.dual(), start=start)
 
 
 @pytest.mark.slow

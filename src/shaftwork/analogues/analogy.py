@@ -90,8 +90,8 @@ class Analogy:
         if self.form is None or not self.profiles or not values:
             return {}
         shafts = {name.rpartition(".")[0] for name in self.profiles}  # only asked for membership
-        given = {name: in_si(name, value) for name, value in values.items()}
-        states = initial_state(CompiledModel(self.form).bind(), given, 0.0)
+        in_units = {name: in_si(name, value) for name, value in values.items()}
+        states = initial_state(CompiledModel(self.form).bind(), in_units, 0.0)
         starts: dict[str, float] = {}
         for state, value in zip(self.form.states, states, strict=True):
             terms = self.quantities.get(state.name, {})

@@ -233,9 +233,9 @@ class _Dual:
         else:
             (edge,) = element.edges
             left, right = self._nodes(edge)
-            made = _made(element)
-            is_source = isinstance(made, VoltageSource | CurrentSource)
-            yield Placed(made, (right, left) if is_source else (left, right))
+            part = _made(element)
+            is_source = isinstance(part, VoltageSource | CurrentSource)
+            yield Placed(part, (right, left) if is_source else (left, right))
             name, sign = element.name, -1.0 if is_source else 1.0
             self.branches[name] = edge[0]
             self.edges[edge] = EdgeReading({f"{name}.i": 1.0}, {f"{name}.u": sign})

@@ -60,12 +60,12 @@ def held_twice(netlist: Netlist, form: StateForm, shared: Mapping[Edge, tuple[Ed
     if not choices:
         return
     slipping = {part.name: (DualModes(part).choice,) for part in form.graph.parts if part.modes}
-    held = state_form(build_graph(netlist.with_choices({**slipping, **choices})))
-    for index in held.tree.links[Kind.COUPLING]:
-        part = held.graph.part_of(index)
+    stuck = state_form(build_graph(netlist.with_choices({**slipping, **choices})))
+    for index in stuck.tree.links[Kind.COUPLING]:
+        part = stuck.graph.part_of(index)
         if part.name not in choices:
             continue
-        others = [name for name in dict.fromkeys(map(held.graph.part_of, held.tree.loops[index])) if name is not part]
-        names = tuple(other.name for other in others)
+        around = (stuck.graph.part_of(branch).name for branch in stuck.tree.loops[index])
+        names = tuple(name for name in dict.fromkeys(around) if name != part.name)
         message = f"{title(part.component)} holds what {listed(names)} can hold too, and how they share it is open."
         yield Diagnostic("no dual", message, "Leave one of them out.", (part.name, *names))

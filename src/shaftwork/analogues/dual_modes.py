@@ -6,14 +6,20 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
-from sympy import Expr, Integer, Or, Piecewise, false
+from sympy import Add, Expr, Float, Integer, Or, Piecewise, Symbol, false
 from sympy.logic.boolalg import Boolean
 
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, readings_in
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import ANEW, Mode, ModeChoice, Modes
 from shaftwork.network.graph import GraphPart, resolve
-from shaftwork.network.templates import make_template
+from shaftwork.network.kinds import Kind
+from shaftwork.network.templates import BranchTemplate, make_template
+
+SAME = 1e-9
+"""So far, in parts of it, a limit may be from the torque at no speed: it is a hundred roundings above."""
+SOME_TIMES = (0.37, 1.9, 27.3)
+"""s, at which the two are compared."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +48,8 @@ class DualModes:
     def is_one_way(self) -> bool:
         """Whether it is a diode or a freewheel."""
         options = self._modes.options
-        return len(options) == 2 and len(self._joined) == 1 and self._joined[0].leaves[0].when == -THROUGH
+        opens = [tuple(leave.when for leave in mode.leaves) for mode in options]
+        return len(self._joined) == 1 and opens == [(ACROSS,), (-THROUGH,)]
 
     @cached_property
     def _slipping(self) -> tuple[str, ...]:
@@ -66,8 +73,10 @@ class DualModes:
         """Why it has no dual, the rest of a sentence that begins with "it"; empty where it has one."""
         if len(self.part.modes) > 1:
             return "changes its modes in several places"
-        if self._modes.law is not None or self.is_one_way:
+        if self._modes.law is not None:
             return ""
+        if self.is_one_way:
+            return "has laws beside what holds one way" if self.part.branches else ""
         if not self.rubs:
             return "changes its mode by other rules than frictions, freewheels and gaps with springs do"
         if any(mode.at_rest is not None for mode in self._modes.options):
@@ -76,7 +85,7 @@ class DualModes:
             return "comes on by a law, and not at a time that is known before"
         if any(law.has(INTEGRAL) or readings_in(law) for laws in self.pairs for law in laws):
             return "rubs by its angle"
-        return ""
+        return "" if self._holds_as_it_rubs else "holds up to another torque than it rubs with as it begins to slip"
 
     @property
     def holds(self) -> bool:
@@ -100,16 +109,35 @@ class DualModes:
     @cached_property
     def pairs(self) -> tuple[tuple[Expr, Expr], ...]:
         """For each branch of what rubs its laws forward and backward, which are zero while it does not rub."""
-        values = resolve(self.part.component)[0]
-        modes = [self._modes[name] for name in self._slipping]
-        choices = ((ModeChoice(mode.form, mode.value),) for mode in modes)
-        ahead, back = (make_template(self.part.component, values, choice).branches for choice in choices)
         off = Or(*(mode.starts for mode in self._off))
 
         def timed(law: Expr) -> Expr:
             return law if off == false else Piecewise((Integer(0), off), (law, True))
 
+        ahead, back = self._slips
         return tuple((timed(first.law), timed(second.law)) for first, second in zip(ahead, back, strict=True))
+
+    @cached_property
+    def _slips(self) -> tuple[tuple[BranchTemplate, ...], ...]:
+        """The branches while it slips forward, and those while it slips backward."""
+        values = resolve(self.part.component)[0]
+        choices = ((ModeChoice(self._modes[name].form, self._modes[name].value),) for name in self._slipping)
+        return tuple(make_template(self.part.component, values, choice).branches for choice in choices)
+
+    @property
+    def _holds_as_it_rubs(self) -> bool:
+        """Whether it gives way at the torque of its laws at no speed, as diodes with sources do."""
+        values = resolve(self.part.component)[0].items()
+        numbers = {Symbol(name, real=True): Float(value) for name, value in values if isinstance(value, float)}
+        for sign, branches in zip((1, -1), self._slips, strict=True):
+            rubs = Add(*(one.law for one in branches if one.kind in (Kind.LAW, Kind.THROUGH_SOURCE)))
+            (limit,) = (leave.when for leave in self._joined[0].leaves if leave.when.diff(THROUGH) == sign)
+            apart = limit.xreplace({THROUGH: Integer(0)}) + sign * rubs.subs(ACROSS, 0)
+            for time in SOME_TIMES:
+                at = {**numbers, TIME: Float(time)}
+                if abs(apart.subs(at).evalf()) > SAME * abs(rubs.subs(ACROSS, 0).subs(at).evalf()):
+                    return False
+        return True
 
 
 def _by_time(mode: Mode) -> bool:
