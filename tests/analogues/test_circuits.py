@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,19 +27,29 @@ def two_masses() -> sw.Network:
     return net
 
 
-def same_motion(net: sw.Network, times: np.ndarray = TIMES, **options: object) -> None:
-    """Every quantity of the network, but for power and energy, read from its circuit, to 1e-9 of its largest value.
+def same_motion(net: sw.Network, times: np.ndarray = TIMES, *, of: sw.Network | None = None, start: Any = None) -> None:
+    """Every quantity of a network, but power and energy, read from its circuit, to 1e-9 of the largest of its kind.
 
     Both take steps of the same engine, so that they differ by rounding alone.
+
+    Args:
+        net: the network.
+        times: at which the two are compared, s.
+        of: an analogue of it, by default its circuit.
+        start: the values at the start.
     """
-    circuit = net.circuit()
-    assert circuit.analogy is not None
-    wanted = net.simulate(times[-1], t_eval=times, rtol=1e-10, **options)
-    found = circuit.simulate(times[-1], t_eval=times, rtol=1e-10, **options)
-    for name in wanted:
-        if not name.endswith((".power", ".energy")):
-            error = np.abs(circuit.analogy.read(found, name) - wanted[name]).max()
-            assert error <= 1e-9 * max(np.abs(wanted[name]).max(), 1e-3), name
+    analogue = of or net.circuit()
+    assert analogue.analogy is not None
+    wanted = net.simulate(times[-1], t_eval=times, rtol=1e-10, initial=start)
+    found = analogue.simulate(times[-1], t_eval=times, rtol=1e-10, initial=start and analogue.analogy.initial(start))
+    names = [name for name in wanted if not name.endswith((".power", ".energy"))]
+    largest: dict[str, float] = {}
+    for name in names:
+        kind = name.rpartition(".")[2].partition("_")[0]
+        largest[kind] = max(largest.get(kind, 1e-3), np.abs(wanted[name]).max())
+    for name in names:
+        error = np.abs(analogue.analogy.read(found, name) - wanted[name]).max()
+        assert error <= 1e-9 * largest[name.rpartition(".")[2].partition("_")[0]], name
 
 
 def test_the_elements_are_those_of_the_analogy() -> None:
@@ -136,6 +147,16 @@ def test_a_circuit_leads_back_to_its_drive_train() -> None:
     assert all(parts[part.name] == part for part in net.parts if part.name != "motor")
     assert parts["motor"] == sw.TorqueSource("motor", tau=60.0)
     assert parts["motor 1"] == sw.Damper("motor 1", d=2.0)
+
+
+@pytest.mark.parametrize(("R", "L"), [(0.5, 0.01), (0.5, 0.0), (0.0, 0.01), (0.0, 0.0)])
+def test_a_machine_has_its_armature_again(R: float, L: float) -> None:
+    net = sw.Network("machine")
+    net.add(sw.VoltageSource("supply", u=24.0), "s", "ground")
+    net.add(sw.Resistor("cable", R=0.1), "s", "p")
+    net.add(sw.DCMachine("machine", k=0.3, R=R, L=L), "p", "ground", "rotor")
+    net.add(sw.Inertia("J", J=0.02), "rotor")
+    assert {part.name: part for part in net.circuit().mechanical().parts} == {part.name: part for part in net.parts}
 
 
 def test_a_circuit_of_ones_own_has_a_drive_train() -> None:

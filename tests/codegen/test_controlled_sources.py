@@ -109,7 +109,7 @@ def test_a_machine_of_controlled_sources_moves_as_one_of_an_ideal_coupling(chang
 
 
 def test_without_inductance_the_current_is_no_state_and_cannot_be_read() -> None:
-    with pytest.raises(sw.NetworkError, match=r"reads through_of\('i_L'\), but the part has no spring or inductor"):
+    with pytest.raises(sw.NetworkError, match=r"reads through_of\('i_L'\), but the part has no spring, inductor"):
         _direct(ControlledMachine, L=0.0).compile()
 
 

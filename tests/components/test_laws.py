@@ -252,7 +252,7 @@ def test_a_law_of_degree_one_is_a_line_on_each_piece(law: sympy.Expr) -> None:
 
 
 def test_the_symbols_are_real_and_bear_their_names() -> None:
-    assert [symbol.name for symbol in SYMBOLS] == ["t", "omega", "phi", "v", "s", "u", "psi"]
+    assert [symbol.name for symbol in SYMBOLS] == ["t", "omega", "phi", "v", "s", "u", "psi", "i", "q"]
     assert all(symbol.is_real for symbol in SYMBOLS)
     assert phi == sympy.Symbol("phi", real=True)
 

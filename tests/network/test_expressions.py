@@ -216,7 +216,7 @@ def test_no_code_runs_from_a_text(text: str, monkeypatch: pytest.MonkeyPatch) ->
         ("t^2", 2, "Write a power as x**2"),
         ("t = 1", 3, "Compare with =="),
         ("t & t", 3, "'and'"),
-        ("torque", 1, "Names here: t, omega, phi, v, s, u, psi, pi"),
+        ("torque", 1, "Names here: t, omega, phi, v, s, u, psi, i, q, pi"),
         ("arctan(t)", 1, "Functions: sin, cos"),
         ("sin", 1, "Write sin(...)"),
         ("sin(t, t)", 1, "It takes 1."),

@@ -10,9 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from shaftwork.codegen.compiled_model import CompiledModel
+from shaftwork.codegen.start_values import initial_state
 from shaftwork.core.domains import Domain
 from shaftwork.core.errors import ParameterError, SignalError
 from shaftwork.core.parameters import in_si
+from shaftwork.formulation.form import StateForm
 from shaftwork.network.netlist import Netlist
 from shaftwork.results.solution import Solution
 
@@ -30,6 +33,8 @@ class Analogy:
             analogue: {"J1.omega": {"J1.u": 1.0}, "shaft.tau": {"shaft.i": 1.0, "shaft d.i": 1.0}}.
         branches: by name of a part the branch of the graph of the original that it stands for.
         domains: of a circuit, the domain in the original of each node that does not rotate there.
+        profiles: by name of a quantity along a shaft of the original, that is written out, such a sum for each place.
+        form: the state form of the original, where its long shafts are written out.
     """
 
     original: str
@@ -37,6 +42,8 @@ class Analogy:
     quantities: Mapping[str, Mapping[str, float]] = field(repr=False)
     branches: Mapping[str, int] = field(repr=False)
     domains: Mapping[str, Domain] = field(default_factory=dict, repr=False)
+    profiles: Mapping[str, tuple[Mapping[str, float], ...]] = field(default_factory=dict, repr=False)
+    form: StateForm | None = field(default=None, repr=False)
 
     def read(self, solution: Solution, name: str) -> NDArray[np.float64]:
         """A quantity of the original from a motion of the analogue, at the output times.
@@ -50,11 +57,14 @@ class Analogy:
         Raises:
             SignalError: the original has no such quantity, or it cannot be read here.
         """
-        terms = [factor * solution[other] for other, factor in self._sum(name).items()]
-        return sum(terms, np.zeros(np.shape(terms[0]) if terms else np.shape(solution.t)))
+        if name in self.profiles:
+            return np.stack([_total(solution, terms) for terms in self.profiles[name]], axis=1)
+        return _total(solution, self._sum(name))
 
     def initial(self, values: Mapping[str, Any]) -> dict[str, float]:
         """Start values of the analogue from those of the original.
+
+        Inside long shafts that are written out speeds lie between those of the ends, as in the original.
 
         Args:
             values: by name of a speed, twist or torque of the original, in SI.
@@ -73,6 +83,21 @@ class Analogy:
                 )
             ((other, factor),) = terms.items()
             starts[other] = in_si(name, value) / factor
+        return {**self._inside_shafts(values), **starts}
+
+    def _inside_shafts(self, values: Mapping[str, Any]) -> dict[str, float]:
+        """What is stored in shafts that are written out, by names of the analogue."""
+        if self.form is None or not self.profiles or not values:
+            return {}
+        shafts = {name.rpartition(".")[0] for name in self.profiles}  # only asked for membership
+        in_units = {name: in_si(name, value) for name, value in values.items()}
+        states = initial_state(CompiledModel(self.form).bind(), in_units, 0.0)
+        starts: dict[str, float] = {}
+        for state, value in zip(self.form.states, states, strict=True):
+            terms = self.quantities.get(state.name, {})
+            if state.name.rpartition(".")[0] in shafts and len(terms) == 1:
+                ((other, factor),) = terms.items()
+                starts[other] = float(value) / factor
         return starts
 
     def _sum(self, name: str) -> Mapping[str, float]:
@@ -80,3 +105,8 @@ class Analogy:
             return self.quantities[name]
         near = get_close_matches(name, self.quantities, n=3) or [*self.quantities][:6]
         raise SignalError(f"'{self.original}' has no quantity '{name}' to read here. Near it: {', '.join(near)}.")
+
+
+def _total(solution: Solution, terms: Mapping[str, float]) -> NDArray[np.float64]:
+    parts = [factor * solution[name] for name, factor in terms.items()]
+    return sum(parts, np.zeros(np.shape(parts[0]) if parts else np.shape(solution.t)))

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
-from typing import Any
 
 from shaftwork.analogues.analogy import Analogy
-from shaftwork.analogues.circuit_elements import Edge, Element, ElementNames, Sum, elements_of, is_linear
+from shaftwork.analogues.circuit_elements import Edge, Element, ElementNames, Sum, elements_of, in_letters, is_linear
 from shaftwork.analogues.images import IN_LAWS, image_class, image_of, in_circuit
 from shaftwork.analogues.readings import EdgeReading, Readings
 from shaftwork.components.base import Component
@@ -20,7 +19,7 @@ from shaftwork.components.electrical import (
     Transformer,
     VoltageSource,
 )
-from shaftwork.components.laws import psi, replaced, u
+from shaftwork.components.laws import psi, u
 from shaftwork.components.modes import ModeChoice
 from shaftwork.core.domains import ELECTRICAL, ROTATION, Domain
 from shaftwork.formulation.form import Names, StateForm, integral_name, state_form, store_name
@@ -172,19 +171,14 @@ def _made(element: Element) -> Component:
         case Kind.CONDUCTANCE:
             return Resistor(name, symbol=symbol, R=1 / value)
         case Kind.ACROSS_SOURCE:
-            return VoltageSource(name, symbol=symbol, u=_in_circuit(value))
+            return VoltageSource(name, symbol=symbol, u=in_letters(value, READ))
         case Kind.THROUGH_SOURCE | Kind.LAW:
-            return CurrentSource(name, symbol=symbol, i=-_in_circuit(value))
+            return CurrentSource(name, symbol=symbol, i=-in_letters(value, READ))
         case Kind.COUPLING if len(element.terms) == 2:
             return Transformer(name, symbol=symbol, ratio=-element.terms[1] / element.terms[0])
         case Kind.COUPLING if len(element.terms) == 1:
             return Resistor(name, symbol=symbol, R=0.0)
     raise AssertionError(f"{element.kind} of '{name}' has no element of a circuit")  # pragma: no cover
-
-
-def _in_circuit(value: Any) -> Any:
-    """A number, or a law in quantities of a circuit."""
-    return value if isinstance(value, float) else replaced(value, READ)
 
 
 def _readings(element: Element) -> Iterator[EdgeReading]:

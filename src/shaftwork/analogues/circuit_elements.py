@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,10 +28,11 @@ class Element:
         symbol: of its own part, where it has the name of that.
         kind: what its law is.
         value: capacity, stiffness or conductance; of a law or source the number or expression of what
-            passes, or is across.
+            passes, or is across; None of what passes one way alone.
         terms: of a coupling the factor of each term; else (1,).
         edges: its keys in the graph, one for each term.
         ends: the names of the nodes of each term.
+        back: what passes backward, where that is another law; else None.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Element:
     terms: tuple[float, ...]
     edges: tuple[Edge, ...]
     ends: tuple[tuple[str, str], ...]
+    back: Any = None
 
 
 class ElementNames:
@@ -66,6 +68,11 @@ class ElementNames:
             return f"{owner} {inner}"
         return f"{name} node" if self._elsewhere.get(name, {number}) != {number} else name
 
+    def mesh(self, number: int) -> str:
+        """The name of a node of the dual; number 0 is its reference."""
+        name = f"mesh {number}"
+        return REFERENCE if number == 0 else f"{name} node" if name in self._taken else name
+
     def of_branches(self, part: GraphPart, kept: int) -> Iterator[str]:
         """A name for each branch of a part: its own for one of them, with the letter of the law behind it for others.
 
@@ -79,12 +86,16 @@ class ElementNames:
                 continue
             template = self._graph.branches[index].template
             letter = template.symbols[0].name if len(template.symbols) == 1 else template.label or str(place + 1)
-            name, count = f"{part.name} {letter}", 1
-            while name in self._taken:
-                count += 1
-                name = f"{part.name} {letter} {count}"
-            self._taken.add(name)
-            yield name
+            yield self.unique(f"{part.name} {letter}")
+
+    def unique(self, name: str) -> str:
+        """A name, or one with a number where that is taken; it is taken from then on."""
+        count, first = 1, name
+        while name in self._taken:
+            count += 1
+            name = f"{first} {count}"
+        self._taken.add(name)
+        return name
 
 
 def is_linear(part: GraphPart, graph: CircuitGraph) -> bool:
@@ -99,15 +110,16 @@ def is_linear(part: GraphPart, graph: CircuitGraph) -> bool:
 def elements_of(part: GraphPart, graph: CircuitGraph, names: ElementNames) -> Iterator[Element]:
     """The elements of a part, in the order of its branches; a coupling or a source has the name of the part."""
     branches = [graph.branches[index] for index in part.branches]
-    first = next((place for place, branch in enumerate(branches) if branch.template.kind in FIRST), 0)
+    named = [place for place, branch in enumerate(branches) if branch.template.kind in FIRST]
+    geared = (place for place in named if len(branches[place].terms) > 1)  # not a resistance that is zero
+    first = next(geared, named[0] if named else 0)
     for name, branch in zip(names.of_branches(part, first), branches, strict=True):
         keys, ends = [], []
         for key, plus, minus in ends_of(branch):
             keys.append(key)
             ends.append((names.node(plus), names.node(minus)))
         factors = tuple(float(in_numbers(factor, branch, graph)) for factor, _, _ in branch.terms) or (1.0,)
-        law = in_numbers(branch.template.law, branch, graph)
-        value = float(law) if law.is_number else law
+        value = in_numbers(branch.template.law, branch, graph)
         symbol = part.component.symbol if name == part.name else None
         yield Element(name, symbol, branch.template.kind, value, factors, tuple(keys), tuple(ends))
 
@@ -116,8 +128,14 @@ FIRST = (Kind.COUPLING, Kind.ACROSS_SOURCE, Kind.THROUGH_SOURCE)
 """Kinds of elements that have the name of their part where it has several elements."""
 
 
-def in_numbers(law: Expr, branch: GraphBranch, graph: CircuitGraph) -> Expr:
-    """A law with the values of its parameters."""
-    owner = graph.parts[branch.part].name
-    values = {symbol: Float(graph.parameters[f"{owner}.{symbol.name}"]) for symbol in branch.template.symbols}
-    return replaced(law, values)
+def in_numbers(law: Expr, branch: GraphBranch, graph: CircuitGraph) -> Any:
+    """A law with the values of its parameters, or the number that it is."""
+    part = graph.parts[branch.part]
+    symbols = (symbol for symbol in law.free_symbols if symbol.name in part.parameters)
+    value = replaced(law, {symbol: Float(graph.parameters[f"{part.name}.{symbol.name}"]) for symbol in symbols})
+    return float(value) if value.is_number else value
+
+
+def in_letters(value: Any, letters: Mapping[Any, Any]) -> Any:
+    """A number, or a law with other letters."""
+    return value if isinstance(value, float) else replaced(value, letters)

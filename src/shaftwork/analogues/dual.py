@@ -3,36 +3,47 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+
+from sympy import Expr, S
 
 from shaftwork.analogues.analogy import Analogy
-from shaftwork.analogues.circuit_elements import Edge, Element, ElementNames, Sum, elements_of, in_numbers, is_linear
+from shaftwork.analogues.circuit_elements import Edge, Element, ElementNames, Sum, elements_of, in_letters, in_numbers
+from shaftwork.analogues.dual_friction import held_twice, side_by_side
+from shaftwork.analogues.dual_modes import DualModes
 from shaftwork.analogues.faces import DualEnds, Kuratowski, dual_ends
 from shaftwork.analogues.readings import EdgeReading, Readings, sums_of_nodes, total
 from shaftwork.analogues.rigid_joints import RigidJoints
 from shaftwork.components.base import Component
+from shaftwork.components.branches import ACROSS, INTEGRAL, RATE
 from shaftwork.components.electrical import (
     Capacitor,
     CurrentSource,
+    Diode,
     Inductor,
     Resistor,
     Transformer,
     VoltageSource,
 )
+from shaftwork.components.laws import i, psi, q, u
 from shaftwork.core.errors import Diagnostic, NetworkError
-from shaftwork.formulation.form import StateForm
-from shaftwork.network.graph import CircuitGraph, GraphPart, ends_of
+from shaftwork.formulation.form import Names, StateForm, integral_name, state_form
+from shaftwork.network.graph import CircuitGraph, GraphPart, build_graph, ends_of
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed, listed, title
 
 OTHERWISE = "Take net.circuit(), which every network has"
-
+READ = {ACROSS: i, INTEGRAL: q}
+"""What laws of branches read, in quantities of their duals."""
+BACK = {i: u, q: psi}
+"""What laws of a source of voltage read, in quantities of their duals."""
 
 RANKS = {
     Kind.THROUGH_STORE: 0,
     Kind.COUPLING: 1,
     Kind.ACROSS_SOURCE: 2,
     Kind.THROUGH_SOURCE: 2,
+    Kind.LAW: 2,
     Kind.CONDUCTANCE: 3,
     Kind.ACROSS_STORE: 4,
 }
@@ -49,41 +60,54 @@ def dual(netlist: Netlist, form: StateForm) -> Analogy:
     Raises:
         NetworkError: a part has no dual, or the graph is not planar.
     """
-    graph = form.graph
     title_of_error = f"'{netlist.name}' has no dual"
-    if problems := tuple(_without_dual(part, graph) for part in graph.parts if not _has_dual(part, graph)):
+    reasons = ((part, _reason(part, form.graph)) for part in form.graph.parts)
+    if problems := tuple(_without_dual(part, why, form.graph) for part, why in reasons if why):
         raise NetworkError(title_of_error, problems)
-    names = ElementNames(graph)
-    idle = frozenset(form.tree.links[Kind.COUPLING])  # of gears side by side all but one, which carry nothing
-    elements = [
-        element
-        for part in graph.parts
-        for element in elements_of(part, graph, names)
-        if element.edges[0][0] not in idle
+    choices = {part.name: (DualModes(part).choice,) for part in form.graph.parts if part.modes}
+    # a part that is open in its first mode has a place in the graph of another one
+    closed = state_form(build_graph(netlist.with_choices(choices))) if choices else form
+    graph, names = closed.graph, ElementNames(closed.graph)
+    idle = frozenset(_idle(closed))
+    elements: Sequence[Element] = [
+        element for part in graph.parts for element in _elements(part, graph, names) if element.edges[0][0] not in idle
     ]
     ends = {key: (plus, minus) for branch in graph.branches for key, plus, minus in ends_of(branch)}
     joints = RigidJoints(elements, ends)
+    elements, shared = side_by_side(elements, ends)
+    if problems := tuple(held_twice(netlist, closed, shared)):
+        raise NetworkError(title_of_error, problems)
     ranks = {edge: RANKS[element.kind] for element in elements for edge in element.edges}
     faces = dual_ends({edge: joints.nodes(edge) for edge in joints.free([*ranks])}, ranks)
     if isinstance(faces, Kuratowski):
         raise NetworkError(title_of_error, (_not_planar(faces, graph),))
-    work = _Dual(faces)
+    work = _Dual(faces, names)
     placed = [item for element in elements for item in work.placed(element)]
     changed = dataclasses.replace(netlist, name=f"dual of {netlist.name}", placed=tuple(placed), ports=())
-    return Analogy(netlist.name, changed, _quantities(form, elements, joints, work.edges), work.branches)
+    quantities, profiles = _quantities(closed, elements, joints, work.edges, shared)
+    return Analogy(netlist.name, changed, quantities, work.branches, profiles=profiles, form=form)
 
 
 def _quantities(
-    form: StateForm, elements: Sequence[Element], joints: RigidJoints, edges: dict[Edge, EdgeReading]
-) -> dict[str, Sum]:
-    """What each quantity of the network is in the dual.
+    form: StateForm,
+    elements: Sequence[Element],
+    joints: RigidJoints,
+    edges: dict[Edge, EdgeReading],
+    shared: Mapping[Edge, tuple[Edge, float]],
+) -> tuple[dict[str, Sum], dict[str, tuple[Sum, ...]]]:
+    """What each quantity of the network is in the dual, and each that is read along a part.
 
     Args:
         form: the state form of the network.
         elements: of the network, without couplings that carry nothing.
         joints: its rigid joints.
         edges: what is read of the edges that have a dual; of the others it is added here.
+        shared: frictions that are part of others; how these share what holds nothing tells.
     """
+    for edge, (first, sign) in shared.items():
+        edges[edge] = EdgeReading(total((sign, edges[first].across)), {})
+    for part in form.graph.parts:
+        _add_others(part, edges)
     couplings = [element for element in elements if element.kind is Kind.COUPLING]
     owner = {edge: element for element in couplings for edge in element.edges}
     for element in couplings:
@@ -92,10 +116,43 @@ def _quantities(
         edges[joint] = EdgeReading({}, joints.through(joint, edges))
         _add_loops(owner[joint], edges)
     nodes = sums_of_nodes(form.graph, edges)
-    for index in form.tree.links[Kind.COUPLING]:
+    for index in _idle(form):
         for key, plus, minus in ends_of(form.graph.branches[index]):
             edges[key] = EdgeReading(total((1.0, nodes[plus]), (-1.0, nodes[minus])), {})
-    return Readings(form, edges, nodes).quantities()
+    angles = ((integral_name(form.graph, form.graph.branches[k]), edges[k, 0].across) for k in form.integrals)
+    charges = {name: {f"{one.removesuffix('.i')}.q": share for one, share in sums.items()} for name, sums in angles}
+    readings = Readings(form, edges, nodes)
+    sharing = {form.graph.part_of(branch).name for pair in shared.items() for branch, _ in (pair[0], pair[1][0])}
+    through = {
+        name
+        for name, (part, signal) in Names(form).signals.items()
+        if part.name in sharing and signal.kind == "through"
+    }
+    quantities = {name: sums for name, sums in readings.quantities().items() if name not in through}
+    return quantities | charges, readings.profiles()
+
+
+def _idle(form: StateForm) -> Iterator[int]:
+    """Of gears side by side all but one, which carry nothing."""
+    return (index for index in form.tree.links[Kind.COUPLING] if not form.graph.part_of(index).modes)
+
+
+def _elements(part: GraphPart, graph: CircuitGraph, names: ElementNames) -> Iterator[Element]:
+    """The elements of a part, with the laws of all its modes."""
+    elements = elements_of(part, graph, names)
+    if (law := _of_current(part)) is not None:
+        yield dataclasses.replace(next(elements), value=law)
+    elif not part.modes:
+        yield from elements
+    elif (modes := DualModes(part)).is_one_way:
+        yield dataclasses.replace(next(elements), kind=Kind.LAW, value=None)
+    elif (whole := part.modes[0].law) is not None:
+        value = in_numbers(whole, graph.branches[part.branches[0]], graph)
+        yield dataclasses.replace(next(elements), kind=Kind.LAW, value=value)
+    else:
+        for element, pair in zip(elements, modes.pairs, strict=True):
+            ahead, back = (in_numbers(law, graph.branches[element.edges[0][0]], graph) for law in pair)
+            yield element if ahead == back else dataclasses.replace(element, kind=Kind.LAW, value=ahead, back=back)
 
 
 def _add_loops(element: Element, edges: dict[Edge, EdgeReading]) -> None:
@@ -106,34 +163,40 @@ def _add_loops(element: Element, edges: dict[Edge, EdgeReading]) -> None:
             edges.setdefault(edge, EdgeReading({}, total((factor / factors[base], edges[base].through))))
 
 
-def _has_dual(part: GraphPart, graph: CircuitGraph) -> bool:
-    return is_linear(part, graph) and not _drives(part, graph)
+def _add_others(part: GraphPart, edges: dict[Edge, EdgeReading]) -> None:
+    """The branches of a part beside the one that stands for all of them."""
+    first, *others = part.branches or (0,)
+    if part.modes and part.modes[0].law is not None:
+        edges.update({(index, 0): EdgeReading(edges[first, 0].across, {}) for index in others})
+    elif _of_current(part) is not None:  # what counts its charge
+        for index, sign in zip(others, (-1.0, 1.0), strict=False):
+            edges[index, 0] = EdgeReading({f"{part.name}.psi": 1.0}, {f"{part.name}.u": sign})
 
 
-def _drives(part: GraphPart, graph: CircuitGraph) -> bool:
-    """Whether a part has a damping below zero, which is no resistance."""
-    branches = (graph.branches[index] for index in part.branches)
-    laws = (in_numbers(one.template.law, one, graph) for one in branches if one.template.kind is Kind.CONDUCTANCE)
-    return any(law < 0 for law in laws)
+def _of_current(part: GraphPart) -> Expr | None:
+    """The law of a source of voltage that reads its own current."""
+    law = part.component.values["u"] if isinstance(part.component, VoltageSource) else None
+    return law if isinstance(law, Expr) and law.has(i, q) else None
 
 
-def _without_dual(part: GraphPart, graph: CircuitGraph) -> Diagnostic:
-    """Why a part has no dual."""
+def _reason(part: GraphPart, graph: CircuitGraph) -> str:
+    """Why a part has no dual; empty where it has one."""
     templates = [graph.branches[index].template for index in part.branches]
-    if part.modes:
-        why = "it changes its mode"
-    elif any(template.line is not None for template in templates):
-        why = "waves travel along it; Lumped(20) instead of Wave() has one"
-    elif any(template.reads for template in templates):
-        why = "its laws read other nodes and branches"
-    elif any(template.through for template in templates):
-        why = "it loses power in its teeth"
-    elif _drives(part, graph):
-        why = "its torque rises with its speed"
-    else:
-        why = "its law is not linear"
+    if any(template.line is not None for template in templates):
+        return "waves travel along it; Lumped(20) instead of Wave() has one"
+    if any(RATE in template.reads for template in templates):
+        return "what it stores changes, and inductances are constant"
+    if any(template.reads for template in templates) and _of_current(part) is None:
+        return "its laws read other nodes and branches, and those of a dual their own current alone"
+    if any(template.through for template in templates):
+        return "it loses power in its teeth, by the direction in which that goes"
+    return f"it {why}" if part.modes and (why := DualModes(part).problem) else ""
+
+
+def _without_dual(part: GraphPart, why: str, graph: CircuitGraph) -> Diagnostic:
+    """The problem of a part that has no dual."""
     nodes = tuple(graph.node_name(number) for number in dict.fromkeys(part.nodes.values()))
-    message = f"{title(part.component)}: {why}, and duals are of stores, dampers, gears and sources over time."
+    message = f"{title(part.component)}: {why}."
     return Diagnostic("no dual", message, f"{OTHERWISE}.", (part.name,), nodes)
 
 
@@ -150,8 +213,8 @@ def _not_planar(why: Kuratowski, graph: CircuitGraph) -> Diagnostic:
 class _Dual:
     """Puts the duals of elements at the faces, and remembers what is read of each edge."""
 
-    def __init__(self, faces: DualEnds) -> None:
-        self._faces = faces
+    def __init__(self, faces: DualEnds, names: ElementNames) -> None:
+        self._faces, self._names = faces, names
         self.edges: dict[Edge, EdgeReading] = {}
         self.branches: dict[str, int] = {}
 
@@ -159,18 +222,27 @@ class _Dual:
         """The parts that are the dual of an element."""
         if element.kind is Kind.COUPLING:
             yield from self._coupling(element)
+        elif element.edges[0] not in self._faces.ends:
+            yield from self._at_rest(element)
+        elif element.value is None:
+            (edge,) = element.edges
+            yield Placed(Diode(element.name, symbol=element.symbol), self._nodes(edge)[::-1])
+            self.edges[edge] = EdgeReading({f"{element.name}.i": -1.0}, {f"{element.name}.u": -1.0})
+        elif element.back is not None:
+            yield from self._rubbing(element)
         else:
             (edge,) = element.edges
             left, right = self._nodes(edge)
-            is_source = element.kind in (Kind.ACROSS_SOURCE, Kind.THROUGH_SOURCE)
-            yield Placed(_made(element), (right, left) if is_source else (left, right))
+            part = _made(element)
+            is_source = isinstance(part, VoltageSource | CurrentSource)
+            yield Placed(part, (right, left) if is_source else (left, right))
             name, sign = element.name, -1.0 if is_source else 1.0
             self.branches[name] = edge[0]
             self.edges[edge] = EdgeReading({f"{name}.i": 1.0}, {f"{name}.u": sign})
         for edge in element.edges:
             if edge in self._faces.bridges:
                 number = f" {edge[1] + 1}" if len(element.edges) > 1 else ""
-                yield Placed(Resistor(f"{element.name} short{number}", R=0.0), self._nodes(edge))
+                yield Placed(Resistor(self._names.unique(f"{element.name} short{number}"), R=0.0), self._nodes(edge))
 
     def _coupling(self, element: Element) -> Iterator[Placed]:
         """Transformers from one term of a coupling to each other one.
@@ -182,7 +254,8 @@ class _Dual:
         if len(sides) < 2:
             return
         (first, base), *others = sides
-        names = [element.name if len(others) == 1 else f"{element.name} {number}" for number in range(1, len(sides))]
+        numbers = () if len(others) == 1 else range(1, len(sides))
+        names = [self._names.unique(f"{element.name} {number}") for number in numbers] or [element.name]
         self.branches |= dict.fromkeys(names, first[0])
         for name, (edge, factor) in zip(names, others, strict=True):
             sign = 1.0 if base / factor > 0 else -1.0
@@ -194,13 +267,41 @@ class _Dual:
         currents = total(*((1.0, {f"{name}.i_1": 1.0}) for name in names))
         self.edges[first] = EdgeReading(currents, {f"{names[0]}.u_1": 1.0})
 
+    def _at_rest(self, element: Element) -> Iterator[Placed]:
+        """A source between nodes that are one, which is of no effect: it feeds a resistor of its own."""
+        (edge,) = element.edges
+        self.edges[edge] = EdgeReading({}, {})
+        if element.kind not in (Kind.THROUGH_SOURCE, Kind.LAW) or element.value is None or element.back is not None:
+            return
+        still = in_letters(element.value, {ACROSS: S.Zero, INTEGRAL: S.Zero})
+        node = f"{element.name} node"
+        yield Placed(_made(dataclasses.replace(element, value=still)), (node, REFERENCE))
+        yield Placed(Resistor(self._names.unique(f"{element.name} alone"), R=1.0), (node, REFERENCE))
+        self.edges[edge] = EdgeReading({}, {f"{element.name}.u": -1.0})
+
+    def _rubbing(self, element: Element) -> Iterator[Placed]:
+        """Two diodes, each of which opens at a voltage of its own."""
+        (edge,) = element.edges
+        left, right = self._nodes(edge)
+        currents: Sum = {}
+        for side, (start, end), law, sign in (
+            ("forward", (left, right), element.value, 1.0),
+            ("backward", (right, left), element.back, -1.0),
+        ):
+            name = self._names.unique(f"{element.name} {side}")
+            diode = self._names.unique(f"{element.name} diode {side}")
+            yield Placed(Diode(diode), (start, f"{name} node"))
+            # the law is that of a current from left to right
+            voltage = -in_letters(law, READ) if sign > 0 else in_letters(law, {ACROSS: -i})
+            yield Placed(VoltageSource(name, u=voltage), (end, f"{name} node"))
+            currents[f"{name}.i"] = sign
+            voltages = {f"{diode}.u": sign, f"{name}.u": -sign}  # the same on both sides
+        self.branches[element.name] = edge[0]
+        self.edges[edge] = EdgeReading(currents, voltages)
+
     def _nodes(self, edge: Edge) -> tuple[str, str]:
         left, right = self._faces.ends[edge]
-        return _node(left), _node(right)
-
-
-def _node(face: int) -> str:
-    return f"mesh {face}" if face else REFERENCE
+        return self._names.mesh(left), self._names.mesh(right)
 
 
 def _made(element: Element) -> Component:
@@ -211,10 +312,12 @@ def _made(element: Element) -> Component:
             return Inductor(name, symbol=symbol, L=value)
         case Kind.THROUGH_STORE:
             return Capacitor(name, symbol=symbol, C=1 / value)
+        case Kind.CONDUCTANCE if value < 0:  # it drives
+            return VoltageSource(name, symbol=symbol, u=-value * i)
         case Kind.CONDUCTANCE:
             return Resistor(name, symbol=symbol, R=value)
         case Kind.ACROSS_SOURCE:
-            return CurrentSource(name, symbol=symbol, i=value)
+            return CurrentSource(name, symbol=symbol, i=in_letters(value, BACK))
         case Kind.THROUGH_SOURCE | Kind.LAW:
-            return VoltageSource(name, symbol=symbol, u=-value)
+            return VoltageSource(name, symbol=symbol, u=-in_letters(value, READ))
     raise AssertionError(f"{element.kind} of '{name}' has no dual element")  # pragma: no cover

@@ -11,9 +11,9 @@ from sympy import Expr, Symbol
 
 from shaftwork.analogues.images import PREFIX
 from shaftwork.components.base import REGISTRY, Component
-from shaftwork.components.electrical import DCMachine, Transformer
+from shaftwork.components.electrical import DCMachine, Inductor, Resistor, Transformer
 from shaftwork.components.friction import Freewheel
-from shaftwork.components.laws import psi, u
+from shaftwork.components.laws import i, psi, q, u
 from shaftwork.components.mechanics import (
     Damper,
     Drum,
@@ -60,7 +60,8 @@ def mechanical(netlist: Netlist, domains: Mapping[str, Domain]) -> Netlist:
             problems.append(Diagnostic("no mechanical part", message, error.hint, (item.part.name,), item.nodes))
     if problems:
         raise NetworkError(f"'{netlist.name}' has no mechanical analogue", tuple(problems))
-    return dataclasses.replace(netlist, name=netlist.name.removeprefix("circuit of "), placed=tuple(_joined(placed)))
+    parts = tuple(_with_armatures([*_joined(placed)]))
+    return dataclasses.replace(netlist, name=netlist.name.removeprefix("circuit of "), placed=parts)
 
 
 def _counterparts(item: Placed, domains: Mapping[str, Domain]) -> Iterator[Placed]:
@@ -107,6 +108,9 @@ def _element(part: Any, nodes: tuple[str, ...], domain: Domain) -> tuple[Compone
             law = _in_domain(value, domain)
             made = TorqueSource(name, symbol=symbol, tau=law) if rotates else ForceSource(name, symbol=symbol, f=law)
             return made, _free(nodes)
+        case "VoltageSource" if isinstance(value, Expr) and value.has(i, q):
+            why = "prescribes its voltage by its own current, and no source of speed reads its torque"
+            raise _NoMechanicalPartError(why, "Where the circuit is a dual, take the network that it is the dual of.")
         case "VoltageSource" if rotates:
             return SpeedSource(name, symbol=symbol, omega=_in_domain(value, domain)), _free(nodes)
         case "Diode" if rotates:
@@ -172,3 +176,23 @@ def _joined(placed: list[Placed]) -> Iterator[Placed]:
             yield dataclasses.replace(item, part=item.part.changed(d=beside.part.values["d"]))
         elif item.part.name not in inside:
             yield item
+
+
+def _with_armatures(placed: list[Placed]) -> Iterator[Placed]:
+    """The parts, where a resistor and a coil that begin with the name of the machine behind them are its armature."""
+    inside: dict[str, None] = {}
+
+    def with_armature(machine: Placed) -> Placed:
+        node, name = machine.nodes[0], f"{machine.part.name} "
+        there = [one for one in placed if node in one.nodes and one.part.name not in (machine.part.name, *inside)]
+        if len(there) != 1 or not isinstance(element := there[0].part, Resistor | Inductor):
+            return machine
+        letter = "L" if isinstance(element, Inductor) else "R"
+        if there[0].nodes[1] != node or not element.name.startswith(name) or machine.part.values[letter]:
+            return machine
+        inside[element.name] = None
+        part = machine.part.changed(**{letter: element.values[letter]})
+        return with_armature(dataclasses.replace(machine, part=part, nodes=(there[0].nodes[0], *machine.nodes[1:])))
+
+    machines = [with_armature(item) if isinstance(item.part, DCMachine) else item for item in placed]
+    return (item for item in machines if item.part.name not in inside)

@@ -59,6 +59,26 @@ class Readings:
                 result.setdefault(store_name(self._graph, branch), edge.across if is_across else edge.through)
         return result
 
+    def profiles(self) -> dict[str, tuple[Sum, ...]]:
+        """For each quantity along a part a sum for each place."""
+        return {
+            f"{part.name}.{name}": tuple(
+                total(*((factor, self._along(part, profile.kind, place)) for factor, place in terms))
+                for terms in profile.of
+            )
+            for part in self._graph.parts
+            for name, profile in part.component.profiles().items()
+        }
+
+    def _along(self, part: GraphPart, kind: str, place: str) -> Sum:
+        """What is across a node, what a part takes in at a port, or what passes through a branch."""
+        if kind == "across":
+            return self._nodes[part.nodes[place]]
+        if place in part.nodes:
+            return self._through(part, place, 1.0)
+        branches = (k for k in part.branches if self._graph.branches[k].template.label == place)
+        return total(*((1.0, self._edges[k, 0].through) for k in branches))  # of a damper of zero there is none
+
     def _signal(self, part: GraphPart, signal: Signal) -> Sum | None:
         """A quantity of a part; None where its branches have no reading."""
         if any(key not in self._edges for index in part.branches for key, _, _ in ends_of(self._graph.branches[index])):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, ClassVar, Literal, Self, TypeVar, dataclass_transform, get_args
 
-from sympy import Expr
+from sympy import Expr, Symbol
 
 from shaftwork.components.branches import Branch, End, is_pair
 from shaftwork.components.modes import Modes
@@ -180,8 +180,8 @@ class Component:
 
     ports: ClassVar[tuple[Port, ...]] = (Port("a"), Port("b"))
     inner: ClassVar[tuple[Port, ...]] = ()
-    signal_ports: ClassVar[frozenset[str]] = frozenset()
-    """Names of inner ports that carry signals of a controller: what its integrator stores is no energy."""
+    signal_ports: ClassVar[frozenset[str]] = frozenset()  # inner ports of signals: what is stored there is no energy
+    letters: ClassVar[Mapping[Symbol, Expr]] = {}  # in laws of users, beside those of its domain: what they stand for
     role: ClassVar[Role] = "store"
     swing: ClassVar[str] = ""  # the parameter that, at zero, leaves a law that swings with an angle its mean
     declared: ClassVar[Mapping[str, Parameter]] = {}

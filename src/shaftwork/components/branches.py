@@ -172,7 +172,8 @@ class ThroughLaw(_Wired):
 class AcrossLaw(_Wired):
     """Across = f(t): prescribed speed, voltage source; a controlled one where it reads other branches of its part.
 
-    What it reads then must follow from states and from sources that depend on time alone.
+    What it reads then must follow from states and from sources that depend on time alone: so must its own current, by
+    `through_of` its label.
     """
 
     across: Expr

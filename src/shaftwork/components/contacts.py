@@ -9,6 +9,7 @@ from sympy import Expr, Integer, Piecewise, true
 
 from shaftwork.components.base import Component, Port, Role, component
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, Branch, ThroughLaw, rigid
+from shaftwork.components.laws import larger, smaller
 from shaftwork.components.modes import NEVER, Leave, Mode, Modes
 from shaftwork.core.domains import TRANSLATION
 from shaftwork.core.errors import ParameterError
@@ -84,7 +85,8 @@ class ContactPart(Component):
                 Mode(parted, (Leave(push, side), Leave(-beyond, "open")), starts=NEVER, says=free),
             ]
         angle = self.twist if p.c is None else ""
-        yield Modes((Mode("open", tuple(closes), starts=inside, says=free), *modes), angle=angle)
+        law = None if p.c is None else _law(*self.limits(p), p)
+        yield Modes((Mode("open", tuple(closes), starts=inside, says=free), *modes), angle=angle, law=law)
 
     def branches(self, p: Any) -> Iterator[Branch]:
         upper, lower = self.limits(p)
@@ -97,6 +99,16 @@ class ContactPart(Component):
         if p.form == CLOSED:
             yield rigid(("a", "b"))
         yield ThroughLaw(p.mode * (1 - p.mode**2) * INTEGRAL, ("a", "b"), self.twist)  # no torque: it carries the twist
+
+
+def _law(upper: Any, lower: Any, p: Any) -> Expr:
+    """The torque of flanks that spring back, in and out of contact."""
+    pieces = []
+    for limit, sign, bound in ((upper, 1, larger), (lower, -1, smaller)):
+        if limit is not None:
+            push = bound(0, p.c * (INTEGRAL - limit) + p.d * ACROSS)
+            pieces.append((push, sign * (INTEGRAL - limit) > 0))
+    return Piecewise(*pieces, (Integer(0), True))
 
 
 def _stored(upper: Any, lower: Any, p: Any) -> Expr:

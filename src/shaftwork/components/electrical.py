@@ -18,11 +18,12 @@ from shaftwork.components.branches import (
     ThroughLaw,
     ThroughStore,
     across_of,
+    readings_in,
     rigid,
     through_of,
 )
 from shaftwork.components.friction import STUCK, conducting, ends, is_past, onset
-from shaftwork.components.laws import t
+from shaftwork.components.laws import as_expression, i, q, t
 from shaftwork.components.modes import ANEW, Leave, Mode, Modes
 from shaftwork.components.motors import on_time
 from shaftwork.core.domains import ELECTRICAL, ROTATION
@@ -96,15 +97,28 @@ class Transformer(Component):
 
 @component
 class VoltageSource(Component):
-    """A voltage from n to p. Law: u_p - u_n = u(t). The signal i is the current delivered at p."""
+    """A voltage from n to p. Law: u_p - u_n = u(t, i, q). The signal i is the current delivered at p.
 
-    u: Any = parameter("V", "voltage", law=True)
+    q is the charge that it has delivered since the start of the motion. A law that reads i or q needs an inductor in
+    series with the source, whose current is a state: a motor in the dual of a drive train has that of its inertia.
+    """
+
+    u: Any = parameter("V", "voltage, also over its own current and charge", law=True)
 
     role: ClassVar[Role] = "source"
     ports: ClassVar = TERMINALS
+    signal_ports: ClassVar[frozenset[str]] = frozenset({"charge"})
+    letters: ClassVar = {i: -through_of("i"), q: across_of("charge")}
+
+    def inner_ports(self) -> tuple[Port, ...]:
+        """The charge, where the law reads it: the voltage of a capacitor of 1 F that carries the current."""
+        return (Port("charge", ELECTRICAL),) if isinstance(self.u, Expr) and self.u.has(q) else ()
 
     def branches(self, p: Any) -> Iterator[Branch]:
-        yield AcrossLaw(p.u)
+        yield AcrossLaw(p.u, label="i" if readings_in(as_expression(p.u)) else "")
+        if self.inner_ports():
+            yield ThroughLaw(through_of("i"), ("charge", None), "counted")
+            yield AcrossStore(Integer(1), ("charge", None), "q")
 
 
 @component

@@ -27,8 +27,12 @@ u = sympy.Symbol("u", real=True)
 """Voltage in V, across the source."""
 psi = sympy.Symbol("psi", real=True)
 """Flux linkage in V s, the integral of `u`."""
+i = sympy.Symbol("i", real=True)
+"""Current in A that a source of voltage delivers."""
+q = sympy.Symbol("q", real=True)
+"""Charge in A s that it has delivered, the integral of `i`."""
 
-SYMBOLS: tuple[sympy.Symbol, ...] = (t, omega, phi, v, s, u, psi)
+SYMBOLS: tuple[sympy.Symbol, ...] = (t, omega, phi, v, s, u, psi, i, q)
 """Every symbol that a law may contain."""
 
 NUMERICAL = {"Interpolation": interpolate, "InterpolationSlope": interpolation_slope, **noise.NUMERICAL}

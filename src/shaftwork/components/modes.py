@@ -144,12 +144,14 @@ class Modes:
         ends: the ports that ACROSS is of (the first less the second); THROUGH is what the first one gives to the part.
         angle: label of the branch that INTEGRAL is of, in all forms; by default the only one that reads it.
         label: of the machine, where the part has several.
+        law: where the modes are the pieces of one through law in ACROSS, INTEGRAL and time, that law.
     """
 
     options: tuple[Mode, ...]
     ends: tuple[End, End] | None = None
     angle: str = ""
     label: str = ""
+    law: Expr | None = None
 
     def __post_init__(self) -> None:
         right = isinstance(self.options, tuple) and all(isinstance(mode, Mode) for mode in self.options)
@@ -162,6 +164,7 @@ class Modes:
             ends=(self.ends is None or is_pair(self.ends), "None, or a pair of ports such as ('a', 'b')"),
             angle=(isinstance(self.angle, str), "the label of a branch"),
             label=(self.label == "" or is_label(self.label), "a text without dots"),
+            law=(self.law is None or isinstance(self.law, Expr), "an expression in ACROSS, INTEGRAL and t, or None"),
         )
 
     def __getitem__(self, name: str) -> Mode:

@@ -128,7 +128,7 @@ class Quantities:
 
     def printed(self, branch: int) -> Expr:
         """The same; of a wave that arrives, what left the other end."""
-        read = {"across": self.node, "through": self.store, "integral": self.integral, "rate": self.rate}
+        read = {"across": self.node, "through": self.carried, "integral": self.integral, "rate": self.rate}
         others = readings_of(self.graph, branch).items()
         return self.own_law(branch).xreplace({symbol: read[reading.kind](reading.of) for symbol, reading in others})
 
@@ -207,13 +207,12 @@ class Quantities:
     def through(self, flow: ThroughQuantity) -> Symbol:
         """The through variable of a flow: a state, where it is a lone store; a parameter, where that is all its law."""
         first = self.graph.branches[flow.branches[0]]
-        if len(flow.branches) == 1:
-            if first.template.kind is Kind.THROUGH_STORE:
-                return self.store(first.index)
+        if len(flow.branches) == 1 and first.template.kind is Kind.THROUGH_STORE:
+            return self.store(first.index)
+        if len(flow.branches) == 1 and first.template.kind is Kind.THROUGH_SOURCE:
             law = flow.sign * self.law(first.index)
-            of_source = law.is_Symbol and first.template.kind is Kind.THROUGH_SOURCE
             # the torque of a part with modes has the same letter in all of them
-            if of_source and law.name in self.graph.parameters and not self.graph.parts[flow.part].modes:
+            if law.is_Symbol and law.name in self.graph.parameters and not self.graph.parts[flow.part].modes:
                 return law
         return self._named(flow.part, self.domain((flow.plus, flow.minus)).through, flow.label)
 
@@ -229,6 +228,11 @@ class Quantities:
             case Kind.COUPLING:
                 return self.multiplier(branch), self.multiplier_sign(branch)
         return self.through(self.flow_of[branch]), self.flow_of[branch].sign
+
+    def carried(self, branch: int) -> Expr:
+        """What passes through a store or a source, as laws read it."""
+        symbol, sign = self.passing(branch)
+        return sign * symbol
 
     def multiplier(self, branch: int) -> Symbol:
         """The through variable of a coupling: a term of coefficient r takes r times it from its node."""
@@ -311,8 +315,10 @@ class Quantities:
         law = self.own_law(branch.index)
         if branch.template.kind is Kind.ACROSS_SOURCE and law.is_Symbol and law.name in self.graph.parameters:
             return law
-        quantity = self.domain((branch.plus, branch.minus)).across
-        return self._named(branch.part, quantity, branch.template.label.removeprefix(f"{quantity.name}_"))
+        domain, label = self.domain((branch.plus, branch.minus)), branch.template.label
+        of_source = branch.template.kind is Kind.ACROSS_SOURCE and label == domain.through.name
+        ending = "" if of_source else label.removeprefix(f"{domain.across.name}_")
+        return self._named(branch.part, domain.across, ending)
 
     def _named(self, part: int, quantity: Quantity, label: str) -> Symbol:
         """The symbol "part.quantity", or "quantity(part)" where a parameter of the part has taken that name."""
@@ -373,6 +379,8 @@ class Quantities:
 
     def _label(self, branch: GraphBranch) -> str:
         template, siblings = branch.template, self.graph.parts[branch.part].branches
+        if template.kind is Kind.ACROSS_SOURCE and template.label == ELECTRICAL.through.name:
+            return ""  # its current, which a law reads, is that of the part
         if template.label:
             return template.label
         names = [symbol.name for symbol in template.symbols]

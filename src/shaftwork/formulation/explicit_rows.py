@@ -135,7 +135,8 @@ class _Solution:
                 gains = exact_of(row[tree] for tree in trees)
                 return Add(*(gain * self.across[tree] for tree, gain in zip(trees, gains, strict=True)))
             case Reading("through", store) if store not in self.through:  # others of its cutset decide
-                links = (*self.form.through_states, *self.form.tree.links[Kind.THROUGH_SOURCE])
+                sources = self.form.tree.links[Kind.THROUGH_SOURCE]
+                links = (*self.form.through_states, *sources, *self.form.link_conductances)
                 return -self.out_of(store, links)
             case Reading("through", store):
                 return self.through[store]

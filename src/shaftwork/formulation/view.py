@@ -148,6 +148,8 @@ def controlled_problems(view: View) -> Iterator[Diagnostic]:
     yield from dict.fromkeys(unknown)  # one cause for all windings of a motor
     for law in view.form.controlled:
         yield from _beside_a_store(view, law)
+    for law in reading:
+        yield from _by_a_current(view, law)
 
 
 def _unknown(view: View, law: int, reading: Reading) -> Iterator[Diagnostic]:
@@ -189,3 +191,20 @@ def _beside_a_store(view: View, law: int) -> Iterator[Diagnostic]:
         )
         hint = f"Put a {words.loss} or {words.spring} between the two."
         yield Diagnostic("controlled source", message, hint, view.parts((law, *stores)), view.ends(stores))
+
+
+def _by_a_current(view: View, law: int) -> Iterator[Diagnostic]:
+    """A current through a source of voltage that a law reads, and that another law decides at the same instant."""
+    currents = {each.of for each in readings_of(view.graph, law).values() if each.kind == "through"}
+    through = currents.intersection(view.tree.tree[Kind.ACROSS_SOURCE])
+    balances = view.tree.cutsets.items() if through else ()
+    # what resists is known after prescribed voltages and before all other laws
+    unknown = (Kind.ACROSS_STORE, Kind.LAW, *((Kind.CONDUCTANCE,) if law in view.form.controlled else ()))
+    answering = [link for link, row in balances if not through.isdisjoint(row) and view.kind(link) in unknown]
+    if answering:
+        words = view.words(law)
+        message = (
+            f"{view.titles((law,))} reads a {words.through} that {view.titles(answering)} decides at the same instant."
+        )
+        hint = f"It needs a series {words.spring}, so that its {words.through} is a state."
+        yield Diagnostic("controlled source", message, hint, view.parts((law, *answering)), view.ends(through))

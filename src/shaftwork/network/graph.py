@@ -354,7 +354,8 @@ def readings_of(graph: CircuitGraph, branch: int) -> Mapping[Symbol, Reading]:
 
 def _stands_for(template: BranchTemplate, kind: str, label: str) -> bool:
     """Whether a branch is the one that a law of its part reads under a label."""
-    readable = template.kind is Kind.THROUGH_STORE if kind == "through" else template.kind is not Kind.COUPLING
+    carrying = template.kind in (Kind.THROUGH_STORE, Kind.ACROSS_SOURCE)
+    readable = carrying if kind == "through" else template.kind is not Kind.COUPLING
     return template.label == label and readable
 
 
@@ -362,7 +363,7 @@ def check_readings(part: Component, templates: tuple[BranchTemplate, ...]) -> No
     """That what the laws of a part read is there.
 
     Raises:
-        ValueError: the part has no such port, no such store, no such branch.
+        ValueError: the part has no such port, no such store or source, no such branch.
     """
     ports = {port.name for port in (*part.ports, *part.inner_ports())}
     for symbol in dict.fromkeys(symbol for template in templates for symbol in template.reads):
@@ -370,5 +371,5 @@ def check_readings(part: Component, templates: tuple[BranchTemplate, ...]) -> No
         if kind == "across" and name not in ports:
             raise ValueError(f"a law reads across_of({name!r}), but the part has no such port")
         if kind in ("through", "integral") and not any(_stands_for(template, kind, name) for template in templates):
-            what = "spring or inductor" if kind == "through" else "branch between two nodes"
+            what = "spring, inductor or source of voltage" if kind == "through" else "branch between two nodes"
             raise ValueError(f"a law reads {kind}_of({name!r}), but the part has no {what} of that label")

@@ -125,13 +125,13 @@ class Template:
 
 
 def substitution(part: Component) -> dict[Any, Any]:
-    """The names that users write in laws (omega, phi; v, s; u, psi): the branch's across variable and its integral."""
+    """The names that users write in laws: omega, phi; v, s; u, psi of the branch, and the letters of the part."""
     names: dict[Any, Any] = {}
     for domain in DOMAINS:
         if any(port.domain is domain for port in part.ports):
             names[Symbol(domain.across.name, real=True)] = ACROSS
             names[Symbol(domain.integral.name, real=True)] = INTEGRAL
-    return names
+    return {**names, **part.letters}
 
 
 def make_template(part: Component, values: Mapping[str, Any], choices: Choices = ()) -> Template:

@@ -272,18 +272,17 @@ class Network(NetworkBuilder):
     def dual(self) -> Network:
         """The dual circuit, force-voltage: inertias are inductors, springs capacitors, parallel is in series.
 
-        Its voltages are torques and its currents speeds. Its nodes are the meshes of the graph, which must be planar;
-        long shafts are written out first. `dual.analogy` tells names. Source: Popenda 2019, (5)-(7).
+        Its voltages are torques and its currents speeds. Laws of speed and angle are laws of current and charge, and
+        what rubs is a pair of diodes. Its nodes are the meshes of the graph, which must be planar; long shafts are
+        written out, but for waves. `dual.analogy` tells names. Source: Popenda 2019, (5)-(7).
 
         Raises:
             NetworkError: the network cannot be assembled, a part has no dual, or the graph is not planar; lists every
                 reason.
-            ParameterError: a shaft's model is no chain of springs, as `Lumped` is.
         """
         from shaftwork.analogues.dual import dual
 
-        netlist = self.expanded().netlist()
-        return self._of_analogy(dual(netlist, sound(netlist)))
+        return self._of_analogy(dual(self.netlist(), sound(self.netlist())))
 
     @staticmethod
     def _of_analogy(analogy: Analogy) -> Network:
@@ -323,7 +322,7 @@ class Network(NetworkBuilder):
 
         refuse_analogy(analogy, as_circuit=as_circuit)
         if analogy == "force-voltage":
-            dual, equations = self.dual(), self.equations(expand=True, phase=phase)
+            dual, equations = self.expanded().dual(), self.equations(expand=True, phase=phase)
             branches = {} if dual.analogy is None else dual.analogy.branches
             return dual_picture(equations, dual.graph(), branches, values=values, width=width)
         equations = self.equations(expand=expand, phase=phase)

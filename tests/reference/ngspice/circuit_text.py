@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
-from sympy import Expr, Float
+from sympy import Expr, Float, Symbol, pi
 from sympy.printing.str import StrPrinter
 
 import shaftwork as sw
@@ -48,9 +48,12 @@ def _lines(part: Any, nodes: tuple[str, ...]) -> Iterator[str]:
             yield f"R{name} {ends} {part.R!r}"
         case "CurrentSource":
             p, n = map(label, nodes)
-            yield f"B{name} {n} {p} I = {_law(part.i, f'v({p},{n})')}"
+            yield f"B{name} {n} {p} I = {_law(part.i, {sw.u: f'v({p},{n})'})}"
         case "VoltageSource":
-            yield f"B{name} {ends} V = {_law(part.u, '')}"
+            p, n = map(label, nodes)
+            delivered = f"i(V{name}_i)"  # by a source of zero volts, which measures it
+            yield f"V{name}_i {name}_i {p} 0"
+            yield f"B{name} {name}_i {n} V = {_law(part.u, {sw.i: delivered})}"
         case "Ground":
             yield f"V{name} {ends} 0 0"
         case "Transformer":
@@ -65,6 +68,6 @@ def _lines(part: Any, nodes: tuple[str, ...]) -> Iterator[str]:
             raise NotImplementedError(other)
 
 
-def _law(law: Any, voltage: str) -> str:
+def _law(law: Any, texts: Mapping[Symbol, str]) -> str:
     expression = law if isinstance(law, Expr) else Float(law)
-    return _Printer().doprint(expression).replace("pi", repr(3.141592653589793)).replace("u", voltage)
+    return _Printer().doprint(expression.subs({pi: pi.n(17), **{one: Symbol(text) for one, text in texts.items()}}))

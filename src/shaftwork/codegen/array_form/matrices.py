@@ -147,7 +147,7 @@ class MatrixAssembly:
         C, D = blocks.output_rows(self.outputs, g_x, g_u)
         z_x, z_u = blocks.integral_rows(self.outputs, C, D)
         if self.form.readings:
-            C, D = blocks.with_readings(C, D, evaluated(self.potentials), g_x, g_u)
+            C, D = blocks.with_readings(C, D, evaluated(self.potentials), (g_x, g_u), (r_x, r_u))
         rate_x, rate_u, rate_du = blocks.rate_rows(c_x, c_u, c_du)
         D1 = blocks.stack([blocks.nothing(*D.shape), rate_du])
         return LinearPart(
@@ -293,15 +293,25 @@ class _MatrixBlocks:
         u = rows[:, self.E] @ self.input("E") + rows[:, self.G] @ g_u
         return x, u
 
-    def with_readings(self, C: Any, D: Any, potentials: Any, g_x: Any, g_u: Any) -> tuple[Any, Any]:
-        """C and D with the rows of what controlled sources read below them."""
+    def with_readings(
+        self, C: Any, D: Any, potentials: Any, across: tuple[Any, Any], through: tuple[Any, Any]
+    ) -> tuple[Any, Any]:
+        """C and D with the rows of what controlled sources read below them.
+
+        Args:
+            C, D: the rows before them.
+            potentials: of the nodes.
+            across: of the tree conductances, from states and inputs.
+            through: of the link conductances, likewise.
+        """
         nodes, stores, integrals = (
             np.array([reading.of for reading in self._readings if reading.kind == kind], dtype=np.intp)
             for kind in ("across", "through", "integral")
         )
-        across_x, across_u = self._of_tree(self.own(potentials[nodes]), g_x, g_u)
+        across_x, across_u = self._of_tree(self.own(potentials[nodes]), *across)
         carried = self._selection(stores, self._loops.shape[0]) - self._cutsets[stores]  # -Q in a tree
-        through_x, through_u = carried[:, self.L] @ self.pick("L"), carried[:, self.W] @ self.input("W")
+        through_x = carried[:, self.L] @ self.pick("L") + carried[:, self.R] @ through[0]
+        through_u = carried[:, self.W] @ self.input("W") + carried[:, self.R] @ through[1]
         places = np.array([self._integral_places[int(branch)] for branch in integrals], dtype=np.intp)
         angles = self._selection(places, self._states)
         none = self.nothing(len(integrals), self._inputs)

@@ -70,7 +70,7 @@ class LawSlopes:
         law, reads = quantities.own_law(index), readings_of(quantities.graph, index)
         if RATE in reads:  # printed it lacks what stands with the store
             law = quantities.graph.in_network_symbols(branch.template.law, branch)
-        names = {"across": quantities.node, "through": quantities.store, "integral": quantities.integral}
+        names = {"across": quantities.node, "through": quantities.carried, "integral": quantities.integral}
         names["rate"] = quantities.rate
         point = {ACROSS: quantities.across((branch.plus, branch.minus)), INTEGRAL: quantities.integral(index)}
         point |= {symbol: names[of.kind](of.of) for symbol, of in reads.items()}
