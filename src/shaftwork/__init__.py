@@ -62,7 +62,13 @@ if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
         v as v,
     )
     from shaftwork.components.loads import *
-    from shaftwork.components.modes import Leave as Leave, Mode as Mode, Modes as Modes
+    from shaftwork.components.modes import (
+        ANEW as ANEW,
+        NEVER as NEVER,
+        Leave as Leave,
+        Mode as Mode,
+        Modes as Modes,
+    )
     from shaftwork.components.drives import motors as motors
     from shaftwork.components.motors import *
     from shaftwork.components.noise import HeldNoise as HeldNoise, SmoothNoise as SmoothNoise
@@ -119,7 +125,7 @@ _HOME = {
         "rigid",
         "through_of",
     ),
-    "shaftwork.components.modes": ("Leave", "Mode", "Modes"),
+    "shaftwork.components.modes": ("ANEW", "NEVER", "Leave", "Mode", "Modes"),
     "shaftwork.components.shaft_models": (
         "Auto",
         "CentralDifference",

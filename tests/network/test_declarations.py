@@ -14,7 +14,6 @@ import shaftwork as sw
 from shaftwork.components import REGISTRY
 from shaftwork.components.base import Derived, Profile
 from shaftwork.components.branches import across_of
-from shaftwork.components.modes import NEVER
 
 ODD: tuple[Any, ...] = (
     *("electrical", "", "a.b", 3, -1.5, 0, True, None, float("nan"), 1j),
@@ -37,7 +36,7 @@ RECORDS: tuple[Any, ...] = (
     sw.Leave(sw.ACROSS - 1, "shut"),
     sw.Mode("open", (sw.Leave(sw.ACROSS - 1, "shut"),)),
     sw.Modes(
-        (sw.Mode("open", (sw.Leave(sw.ACROSS - 1, "shut"),)), sw.Mode("shut", value=1.0, starts=NEVER)), ("a", "b")
+        (sw.Mode("open", (sw.Leave(sw.ACROSS - 1, "shut"),)), sw.Mode("shut", value=1.0, starts=sw.NEVER)), ("a", "b")
     ),
 )
 FIELDS = [
@@ -97,9 +96,28 @@ def test_the_declarations_that_are_spoilt_below_are_sound(record: Any) -> None:
 
 
 def test_a_mode_that_leads_to_none_there_is_is_named_with_those_there_are() -> None:
-    modes = (sw.Mode("open", (sw.Leave(sw.ACROSS - 1, "ajar"),)), sw.Mode("shut", value=1.0, starts=NEVER))
+    modes = (sw.Mode("open", (sw.Leave(sw.ACROSS - 1, "ajar"),)), sw.Mode("shut", value=1.0, starts=sw.NEVER))
     (problem,) = (one for one in net_with(sw.Modes(modes, ("a", "b"))).check() if one.severity == "error")
     assert "a mode leads to 'ajar', which is none of: open, shut" in problem.message
+
+
+def test_a_first_mode_that_joins_rigidly_is_refused_with_what_to_write_instead() -> None:
+    """The others are rigid where their form differs from that of the first."""
+    holding = (sw.Mode("held", (sw.Leave(sw.THROUGH - 1, "free"),)), sw.Mode("free", form="free", starts=sw.NEVER))
+
+    class Odd(sw.Component):
+        def modes(self, _p: Any) -> Iterator[sw.Modes]:
+            yield sw.Modes(holding, ("a", "b"))
+
+        def branches(self, p: Any) -> Iterator[Any]:
+            yield sw.ThroughLaw(1.0) if p.form else sw.rigid(("a", "b"))
+
+    net = sw.Network("train")
+    net.add(sw.Inertia("J1", J=1.0), "rotor")
+    net.add(sw.component(Odd)("odd"), "rotor", "wheel")
+    net.add(sw.Inertia("J2", J=1.0), "wheel")
+    (problem,) = (one for one in net.check() if one.severity == "error")
+    assert "its first mode, 'held', joins its ends rigidly" in problem.message
 
 
 def _run_unless_refused(net: sw.Network) -> None:

@@ -23,7 +23,7 @@ class Mesh:
     """A shaft as speeds at nodes and torques at stations.
 
     Args:
-        intervals: how many times the unit of all shares goes into the shaft.
+        intervals: how many times the unit of all shares goes into the shaft; 1 where its elements are unequal.
         nodes: (n,) places of the speeds, from 0 to 1.
         inertias: (n,) the length whose inertia is at each; they sum to the shaft, less what a closure leaves out.
         stations: (k,) places of the torques.

@@ -311,7 +311,10 @@ def _endless(t: float, transitions: list[Transition], blocked: NetworkError | No
     elif last.rebound:
         after, advice = "rebound", "Take a restitution below 1, a larger omega_rest, or a gap between its limits."
     else:
-        advice = "Give the node between them an inertia or damping."
+        advice = (
+            "Give the node between them an inertia or damping. Of a part of your own, no mode may end at once where "
+            "another one leads into it: the limit that ends holding lies above the torque at which it begins."
+        )
     return SimulationError(
         f"At t = {t:.9g} s no modes of {', '.join(others)} are consistent: '{last.machine.name}' changes for ever "
         f"between {before} and {after}. {advice}"

@@ -39,8 +39,8 @@ class EngineEntry:
         loosest: the loosest one that it runs with.
         absolute: whether `each` state has an absolute tolerance, all have one `overall`, or there are `none`.
         following: of an engine that follows guards, the part of the tolerance that it then runs with, and the loosest
-            one: an error grows with every change of mode, by some hundreds through sixty contacts. None where it
-            follows none, and is refused where parts change their mode.
+            one: an error grows with every change of mode, by some hundreds through sixty contacts, so measure these
+            two on the scene crane. None where it follows none, and is refused where parts change their mode.
         unless_stiff: the entry that replaces it in motions with changes of mode that are not stiff; empty for none.
         part_of: the engine as users call it, where this is another method of it; empty where it is one itself.
     """

@@ -71,11 +71,13 @@ class Stepper(Protocol):
     def again(self, t: float, x: Array, end: float, longest: float) -> None:
         """Forget the last step; the next ones start there once more, and none ends beyond a switch.
 
+        Called before a switch and after a guard. Each call replaces what the one before has set.
+
         Args:
             t: where it started, s.
             x: (n,) state there.
             end: up to which they go at most, s; from there on the piece goes on to its own end.
-            longest: a step at most, s.
+            longest: a step at most up to `end`, s.
         """
         ...
 

@@ -182,6 +182,13 @@ def _check_modes(part: Component, ports: Mapping[str, Port], template: Template,
         strange = {symbol.name for symbol in leave.when.free_symbols if not named_in(symbol)[0]} - readable
         if strange:
             raise ValueError(f"what ends a mode reads {min(strange)}; it can read {', '.join(sorted(readable))}")
+    ends = {*(element.ends or (part.ports[0].name, part.ports[1].name if len(part.ports) > 1 else None))}
+    joints = (branch.terms for branch in template.branches if branch.kind is Kind.COUPLING)
+    if any(len(terms) == 1 and {*terms[0][1:]} == ends for terms in joints):
+        raise ValueError(
+            f"its first mode, {names[0]!r}, joins its ends rigidly, and the others are told from it; put one that does "
+            "not first, with starts=sw.NEVER where no motion begins in it"
+        )
 
 
 def _check_ends(what: str, ends: tuple[End, ...], ports: Mapping[str, Port]) -> None:

@@ -15,7 +15,7 @@ from shaftwork.results.course import NODES, GaussPanels, LobattoPanels, integrat
 from shaftwork.results.observer import Array, DenseStates, Observer, blocks
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class EnergyBalance:
     """Energies at the ends of the integration steps.
 
@@ -37,6 +37,13 @@ class EnergyBalance:
     work: float
     lost_in: Mapping[str, float] = field(default_factory=dict)
     supplied_by: Mapping[str, float] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        lost, supplied = (sum(parts.values()) for parts in (self.lost_in, self.supplied_by))
+        return (
+            f"EnergyBalance from {self.t[0]:g} to {self.t[-1]:g} s: {supplied:.6g} J supplied, {lost:.6g} J lost, "
+            f"{self.stored[-1] - self.stored[0]:.6g} J stored, residual {self.residual:.1e}"
+        )
 
     @property
     def residual(self) -> float:
