@@ -340,3 +340,10 @@ def test_a_network_that_cannot_be_assembled_has_no_picture_and_an_error_that_say
 
 def test_a_notebook_shows_the_drawing() -> None:
     assert sw.scenes.crane()._repr_html_().startswith("<svg")
+
+
+@pytest.mark.parametrize("scene", ["six-phases", "ship-line"])
+def test_the_dual_of_open_gaps_and_of_shafts_that_are_no_chains_is_drawn(scene: str) -> None:
+    """A gap is open in the first modes, so its branch is in no equation there; a spectral shaft has no parts inside."""
+    net = sw.scenes.SCENES[scene]()
+    check(net, as_circuit=True, expected=nodes_of(net.dual()), analogy="force-voltage")

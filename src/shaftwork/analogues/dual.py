@@ -85,7 +85,19 @@ def dual(netlist: Netlist, form: StateForm) -> Analogy:
     placed = [item for element in elements for item in work.placed(element)]
     changed = dataclasses.replace(netlist, name=f"dual of {netlist.name}", placed=tuple(placed), ports=())
     quantities, profiles = _quantities(closed, elements, joints, work.edges, shared)
-    return Analogy(netlist.name, changed, quantities, work.branches, profiles=profiles, form=form)
+    branches = _in_first_modes(work.branches, closed.graph, form.graph)
+    return Analogy(netlist.name, changed, quantities, branches, profiles=profiles, form=form)
+
+
+def _in_first_modes(branches: Mapping[str, int], closed: CircuitGraph, first: CircuitGraph) -> dict[str, int]:
+    """Branches of the graph in which contacts are closed, in that of the first modes; without those that it lacks."""
+    place = {
+        closed_branch: branch
+        for closed_part, part in zip(closed.parts, first.parts, strict=True)
+        if len(closed_part.branches) == len(part.branches)
+        for closed_branch, branch in zip(closed_part.branches, part.branches, strict=True)
+    }
+    return {name: place[branch] for name, branch in branches.items() if branch in place}
 
 
 def _quantities(

@@ -228,7 +228,8 @@ def circuit_items(letters: Letters) -> Iterator[Item]:
     graph = letters.graph
     for part in graph.parts:
         ports = tuple(part.nodes[port.name] for port in part.component.ports)
-        branches = [graph.branches[k] for k in part.branches]
+        signals = {part.nodes.get(name) for name in part.component.signal_ports}
+        branches = [graph.branches[k] for k in part.branches if signals.isdisjoint(nodes_of(graph.branches[k]))]
         inner = any(node not in (*ports, GROUND) for branch in branches for node in nodes_of(branch))
         symbol = symbol_of(part)
         # A part of more than four elements, such as a machine with windings, is one box.

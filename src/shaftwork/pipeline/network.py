@@ -322,7 +322,11 @@ class Network(NetworkBuilder):
 
         refuse_analogy(analogy, as_circuit=as_circuit)
         if analogy == "force-voltage":
-            dual, equations = self.expanded().dual(), self.equations(expand=True, phase=phase)
+            try:
+                dual, chains = self.expanded().dual(), True
+            except ParameterError:  # a shaft is no chain of springs
+                dual, chains = self.dual(), False
+            equations = self.equations(expand=chains, phase=phase)
             branches = {} if dual.analogy is None else dual.analogy.branches
             return dual_picture(equations, dual.graph(), branches, values=values, width=width)
         equations = self.equations(expand=expand, phase=phase)
