@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import shutil
 import subprocess
@@ -435,3 +436,27 @@ def test_the_command_writes_the_files_of_a_report(tmp_path: Path, monkeypatch: p
 def test_sections_are_in_the_order_of_the_table() -> None:
     report = sw.report(SCENES["crane-start"], sections=["extremes", "drawing"])
     assert [heading for heading, _ in report.sections] == [SECTIONS["drawing"][0], SECTIONS["extremes"][0]]
+
+
+@pytest.mark.parametrize(
+    ("contents", "message"),
+    [
+        ({"at": {"x.y": 3.0}}, "There is no speed, twist or torque 'x.y'"),
+        ({"at": {"J1.omega": math.nan}}, "'J1.omega' = nan must be a finite number"),
+        ({"t_end": 1.0, "sn": {"foo.tau": sw.SNLine(amplitude=5.0, cycles=1e6, slope=5.0)}}, "no quantity 'foo.tau'"),
+        ({"speeds": [30.0, 10.0]}, "must be two or more speeds"),
+        ({"orders": [1.0]}, "Give its speeds= too"),
+        ({"sections": ["motion"]}, "say nothing"),
+        ({"signals": ["J1.omega"]}, "needs a motion"),
+        ({"text": {"conclusions": "[a](other.md)"}}, "'other.md' leads to no page"),
+    ],
+)
+def test_what_is_asked_for_is_in_the_report_or_refused(contents: dict[str, Any], message: str) -> None:
+    """A document that someone signs leaves nothing out that he has asked for."""
+    net = sw.Network("two masses")
+    net.add(sw.TorqueSource("motor", tau=10.0), "rotor")
+    net.add(sw.Inertia("J1", J=2.0), "rotor")
+    net.add(sw.Spring("shaft", c=100.0, d=1.0), "rotor", "wheel")
+    net.add(sw.Inertia("J2", J=3.0), "wheel")
+    with pytest.raises(sw.ShaftworkError, match=re.escape(message)):
+        sw.report(net, **contents)

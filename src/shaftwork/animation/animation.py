@@ -16,6 +16,7 @@ import numpy as np
 
 from shaftwork.animation.turning import SPEEDS, train_of
 from shaftwork.core.errors import ParameterError
+from shaftwork.core.files import in_a_folder
 from shaftwork.core.parameters import in_si
 from shaftwork.results.lettering import lettered, replaced
 from shaftwork.results.observer import Array, PhaseRow, Reader
@@ -76,11 +77,11 @@ class Animation:
         """Write it; the format follows from the end of the name: .gif, .html, or .mp4, for which ffmpeg is needed.
 
         Raises:
-            ParameterError: another end, or ffmpeg is not installed.
+            ParameterError: another end, no such folder, or ffmpeg is not installed.
         """
         from matplotlib.animation import FFMpegWriter, PillowWriter
 
-        path = Path(path)
+        path = in_a_folder(path)
         match path.suffix.lower():
             case ".html":
                 path.write_text(self._html, encoding="utf-8")

@@ -11,6 +11,22 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import IO
 
+from shaftwork.core.errors import ParameterError
+
+
+def in_a_folder(path: str | Path) -> Path:
+    """A path to write to, in a folder that there is.
+
+    Raises:
+        ParameterError: there is no such folder, or the path is the name of no file.
+    """
+    if not isinstance(path, str | Path) or "\0" in str(path):
+        raise ParameterError(f"path = {path!r} must be the name of a file, such as 'report.pdf'.")
+    place = Path(path)
+    if not place.parent.is_dir():
+        raise ParameterError(f"There is no folder '{place.parent}' for '{place.name}'. Make it, or name another.")
+    return place
+
 
 @contextlib.contextmanager
 def replaced(path: str | Path) -> Iterator[IO[str]]:

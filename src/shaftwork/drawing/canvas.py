@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from shaftwork.core.domains import ELECTRICAL, ROTATION
 from shaftwork.core.errors import ParameterError
+from shaftwork.core.files import in_a_folder
 from shaftwork.drawing.items import Item, plain
 from shaftwork.drawing.layout import SHEET, Box, Placement, Spot
 from shaftwork.drawing.placement import placed
@@ -115,10 +116,10 @@ class Drawing:
         """Write it; the format follows from the end of the name: .svg, .pdf, .png, or .tex for TikZ.
 
         Raises:
-            ParameterError: another end; a drawing that is too large for the format.
+            ParameterError: another end; no such folder; a drawing that is too large for the format.
             MissingExtraError: matplotlib is not installed.
         """
-        path = Path(path)
+        path = in_a_folder(path)
         ending = path.suffix.removeprefix(".").lower()
         if ending not in FORMATS:
             raise ParameterError(f"A drawing is no '{path.suffix}'. Take .{', .'.join(FORMATS)}.")

@@ -12,7 +12,7 @@ import threading
 import webbrowser
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from shaftwork.core.errors import ParameterError, ShaftworkError, imported
 from shaftwork.core.parameters import whole
@@ -194,12 +194,24 @@ def _answered(session: Session, text: str, waits: Callable[[], bool]) -> str:
     """The answer to a request, both as JSON; the number by which a page tells its requests is that of the answer."""
     number = None
     try:
-        request = json.loads(text)
+        request = read_json(text)
         number = request.pop("number", None) if isinstance(request, dict) else None
         return json.dumps({"number": number, **session.answer(request, waits)}, allow_nan=False)
     except Exception as error:  # noqa: BLE001 (as on the command line: laws beyond all measure may raise anything)
-        said = f"The answer failed with {type(error).__name__}: {' '.join(str(error).split())}."
+        said = f"The answer failed with {type(error).__name__}: {' '.join(str(error).split()).removesuffix('.')}."
         return json.dumps({"number": number, "error": said})
+
+
+def read_json(text: str) -> Any:
+    """What a page sends.
+
+    Raises:
+        ParameterError: it is no JSON.
+    """
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        raise ParameterError(f"The request {text[:40]!r} is no JSON. The page of this version sends what is.") from None
 
 
 def _written(session: Session, name: str, text: bytes, waits: Callable[[], bool]) -> bytes | str:

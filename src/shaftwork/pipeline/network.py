@@ -322,11 +322,7 @@ class Network(NetworkBuilder):
 
         refuse_analogy(analogy, as_circuit=as_circuit)
         if analogy == "force-voltage":
-            try:
-                dual, chains = self.expanded().dual(), True
-            except ParameterError:  # a shaft is no chain of springs
-                dual, chains = self.dual(), False
-            equations = self.equations(expand=chains, phase=phase)
+            dual, equations = (self.expanded() if expand else self).dual(), self.equations(expand=expand, phase=phase)
             branches = {} if dual.analogy is None else dual.analogy.branches
             return dual_picture(equations, dual.graph(), branches, values=values, width=width)
         equations = self.equations(expand=expand, phase=phase)

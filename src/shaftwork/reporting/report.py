@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
 from shaftwork.core.errors import ParameterError, ShaftworkError
+from shaftwork.core.files import in_a_folder
 from shaftwork.equations.spelling import in_text, stand_ins
 from shaftwork.latex.document import BEGIN, PREAMBLE
 from shaftwork.pipeline.network import Network, network_of
@@ -22,6 +23,7 @@ from shaftwork.reporting.report_arguments import (
     checked,
     checked_head,
     refuse_foreign,
+    refuse_idle,
     refuse_unknown,
     section_names,
 )
@@ -140,14 +142,10 @@ class Report:
             ShaftworkError: the file cannot be written, as on a full disk.
             MissingExtraError: pandoc, or Typst for PDF, is not installed (extra `report`).
         """
-        if not isinstance(path, str | Path):
-            raise ParameterError(f"path = {path!r} must be the name of a file, such as 'report.pdf'.")
-        place = Path(path)
+        place = in_a_folder(path)
         ending = place.suffix.lower()
         if ending.removeprefix(".") not in FORMATS:
             raise ParameterError(f"A report is no '{place.suffix}'. Take .{', .'.join(FORMATS)}.")
-        if not place.parent.is_dir():
-            raise ParameterError(f"There is no folder '{place.parent}' for '{place.name}'. Make it, or name another.")
         try:
             match ending:
                 case ".pdf":
@@ -213,6 +211,8 @@ def report(
     about = _subject(subject, solution, t_end, source, checked(contents))
     by_default = subject.title if isinstance(subject, Scene) else about.network.name
     written = _written(about, words, wanted)
+    if not written:
+        raise ParameterError(f"sections = {sections!r} say nothing. Those of a motion need t_end= or solution=.")
     return _document(about, written, by_default if title is None else title, author, date, revision)
 
 
@@ -252,6 +252,7 @@ def _subject(
         refuse_foreign(solution, network)
     refuse_unknown(contents.get("origins", {}), network)
     motion = network.simulate(end) if solution is None and end is not None else solution
+    refuse_idle(contents, motion)
     origin = source if source is not None else scene.source if scene else ""
     literature = (full for short, full in LITERATURE.items() if short in origin)
     return Subject(

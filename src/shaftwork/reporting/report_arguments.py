@@ -171,3 +171,19 @@ def refuse_unknown(origins: Mapping[str, str], network: Network) -> None:
         if name not in there and all(name not in parameters for parameters in there.values()):
             near = there.get(str(name).rpartition(".")[0]) or list(there)
             raise ParameterError(f"origins: there is no part or parameter {name!r}. There are: {', '.join(near[:20])}.")
+
+
+def refuse_idle(contents: Contents, motion: Solution | None) -> None:
+    """Refuse contents that would have no effect.
+
+    Raises:
+        ParameterError: they are of a motion or a diagram that the report does not have, or of none of its quantities.
+    """
+    if "orders" in contents and "speeds" not in contents:
+        raise ParameterError("orders= are those of a Campbell diagram. Give its speeds= too.")
+    if idle := [name for name in ("signals", "phases", "sn") if name in contents and motion is None]:
+        raise ParameterError(f"{idle[0]}= needs a motion. Give t_end= or solution=.")
+    lines = contents.get("sn")
+    for name in lines if isinstance(lines, Mapping) else ():
+        if motion is not None and name not in motion:
+            raise ParameterError(f"sn: the motion has no quantity {name!r}. It has: {', '.join([*motion][:20])}.")

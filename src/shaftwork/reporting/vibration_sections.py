@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from shaftwork.core.errors import ShaftworkError
+from shaftwork.core.errors import ParameterError, ShaftworkError
 from shaftwork.core.screen import MOST_MODES
 from shaftwork.equations.spelling import in_text
 from shaftwork.latex.nomenclature import breakable
@@ -21,6 +21,8 @@ def frequencies(subject: Subject) -> ReportSection:
     try:
         modes = subject.network.modes(subject.at)
     except ShaftworkError as reason:
+        if subject.at is not None:
+            raise  # it is what the user asked for
         return ReportSection(notes=(f"Natural frequencies are left out: {reason}",))
     rows = [
         (in_text(name), number(f), number(60 * f), number(damping, 4), in_text(node))
@@ -43,6 +45,8 @@ def campbell(subject: Subject) -> ReportSection:
             diagram = subject.torsional.campbell(subject.orders)
         else:
             diagram = subject.network.campbell(subject.speeds, subject.orders, at=subject.at)
+    except ParameterError:
+        raise  # of what the user gave
     except ShaftworkError as reason:
         return ReportSection(notes=(f"The Campbell diagram is left out: {reason}",))
     rows = [

@@ -93,7 +93,7 @@ def _refuse_strange(section: str, target: str) -> None:
     """
     # browsers read over blanks and control signs within the scheme
     scheme = SCHEME.match("".join(sign for sign in unquote(target) if sign.isprintable() and not sign.isspace()))
-    if scheme and scheme[1].lower() not in SCHEMES:
+    if scheme is None or scheme[1].lower() not in SCHEMES:
         raise ParameterError(
             f"text of section {section!r}: the link {target!r} leads to no page. Links may begin with: "
             f"{', '.join(SCHEMES)}."

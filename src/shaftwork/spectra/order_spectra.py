@@ -53,7 +53,7 @@ class OrderSpectra:
         Raises:
             ParameterError: there is no such order in the spectra.
         """
-        if not 0.0 <= number <= self.orders[-1]:
+        if not isinstance(number, int | float) or not 0.0 <= number <= self.orders[-1]:
             raise ParameterError(f"order = {number!r} must be from 0 to {self.orders[-1]:g}, the highest order here.")
         return np.asarray(self.amplitudes[:, int(np.argmin(np.abs(self.orders - number)))])
 
