@@ -164,10 +164,8 @@ def test_the_socket_answers_as_the_session_does_and_stays_open_after_an_error(
         line.send(json.dumps(request))
         answer = json.loads(line.recv(SECONDS))
         line.send("{")
-            said = json.loads(line.recv(SECONDS))["error"]
-            assert said.startswith("The answer failed with ParameterError: The request '{' is no JSON.")
-            "The answer failed with ParameterError: The request '{' is no JSON."
-        )
+        said = json.loads(line.recv(SECONDS))["error"]
+        assert said.startswith("The answer failed with ParameterError: The request '{' is no JSON.")
         line.send(json.dumps({"set": {"J2.J": -1}}))
         assert json.loads(line.recv(SECONDS))["error"] == "Inertia 'J2': J = -1 must be at least 0."
         line.send(json.dumps(request))

@@ -404,3 +404,16 @@ def test_modes_say_at_which_speed_they_are_taken() -> None:
     net.remove("load")
     net.add(sw.TorqueSource("water", tau=-0.01 * sw.omega**2), "n5")
     assert "operating point at 1145.9 1/min" in sw.torsional_calculation(net, [40.0, 120.0]).modes.title
+
+
+def test_what_loses_nothing_loses_nothing_at_an_undamped_resonance_either() -> None:
+    """There the amplitudes are infinite, and the power of a spring without damping, or of an inertia, is no number."""
+    net = sw.Network("undamped")
+    net.add(sw.HarmonicTorque("e", harmonics=sw.Harmonics(orders=(1.0, 2.0), amplitudes=(500.0, 500.0))), "a")
+    net.add(sw.Inertia("J1", J=8.0), "a")
+    net.add(sw.Spring("s", c=2e5, d=0), "a", "b")
+    net.add(sw.Inertia("J2", J=12.0), "b")
+    calculation = sw.torsional_calculation(net, np.linspace(50, 180, 10))
+    assert not np.isfinite(calculation["s"].amplitude).all()
+    assert all((power == 0.0).all() or np.abs(power).max() < 1e-6 for power in calculation.power_lost.values())
+    assert calculation.heat == ()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -120,3 +121,10 @@ def test_ranges_that_overlap_are_one() -> None:
     assert len(only.exceeded) == len(only.critical) == 2
     assert only.start == pytest.approx(16 * only.critical[0] / (18 - only.critical[0] / 100))
     assert overlapping([only, only]) == ((only.start, only.end),)
+
+
+@pytest.mark.parametrize("ratio", [math.nan, -1.0, "a"])
+def test_a_ratio_that_is_no_speed_has_no_limit(ratio: Any) -> None:
+    section = sw.torsional.Section("s", diameter=0.1, design="propeller", strength=5e8)
+    with pytest.raises(sw.ParameterError, match="must be speeds over the rated one, 0 or more"):
+        section.permitted(ratio)

@@ -97,7 +97,7 @@ def order_excitations(net: Network, misfire: Misfire) -> tuple[OrderExcitation, 
             case Harmonics() as other:
                 harmonics = other
             case share:
-                scale *= in_si(f"misfire['{name}']", share)
+                scale *= in_si(f"misfire['{name}']", share, at_least=0)
         excitations.append(OrderExcitation(part, harmonics, scale))
     return tuple(excitations)
 

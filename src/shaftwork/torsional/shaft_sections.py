@@ -135,7 +135,7 @@ class Section:
             ratio: of the speed to the rated one, any shape.
 
         Raises:
-            ParameterError: the section has no design.
+            ParameterError: the section has no design, or a ratio is no number from 0 on.
 
         Source: IACS UR M68, as in the Rules of the Korean Register 2025, part 5, chapter 4, 202; for what stress is
         meant, Lloyd's Register, Rules for Naval Ships 2023, volume 2, part 5, chapter 1, 3.1.
@@ -144,7 +144,12 @@ class Section:
             raise ParameterError(f"Section '{self.shaft}' has no design. Give design= and strength=.")
         assert self.diameter is not None  # noqa: S101 (as above)
         design = DESIGNS[self.design]
-        speed = np.asarray(ratio, dtype=float)
+        try:
+            speed = np.asarray(ratio, dtype=float)
+        except (TypeError, ValueError):
+            speed = np.full(1, np.nan)
+        if not (speed >= 0.0).all():
+            raise ParameterError(f"ratio = {ratio!r} must be speeds over the rated one, 0 or more.")
         strength = min(self.strength, design.strongest[self.alloy]) / MPA
         size = 0.35 + 0.93 * (1e3 * self.diameter) ** -0.2
         shape = np.where(speed < STEP, 3 - 2 * speed**2, 1.38)

@@ -262,17 +262,21 @@ class TorsionalCalculation(Mapping[str, ShaftVibration]):
     def power_lost(self) -> Mapping[str, Array]:
         """By part the mean power (n,) in W that it takes out of the vibration; below 0 where it feeds it.
 
-        Law: sum_k Re(conj(tau_k) omega_k) / 2. All parts together take what `power_fed` says.
+        Law: sum_k Re(conj(tau_k) omega_k) / 2. All parts together take what `power_fed` says. At a resonance that
+        nothing damps it is infinite for parts that take any at other speeds, and 0 for the others.
         """
         ports = self.train.ports
         names = tuple(dict.fromkeys(name for several in ports.values() for port in several for name in port[:2]))
         read = self.train.amplitudes(self.speeds, names)
         lost = {}
         for part, several in ports.items():
-            power = sum((_mean_power(read[port.through], read[port.across], port.sign) for port in several), 0.0)
-            lost[part] = np.broadcast_to(np.asarray(power, dtype=float), self.speeds.shape)
-        for name, fed in self.power_fed.items():
-            lost[name] = lost[name] + fed
+            pairs = [(read[port.through], read[port.across], port.sign) for port in several]
+            still = np.zeros(len(self.speeds))
+            power = sum((_mean_power(*pair) for pair in pairs), self.power_fed.get(part, still))
+            swinging = sum((_mean_power(np.abs(tau), np.abs(omega), 1.0) for tau, omega, _ in pairs), still)
+            bounded = np.isfinite(swinging)
+            takes = np.abs(power[bounded]).max(initial=0.0) > TYPED * swinging[bounded].max(initial=0.0)
+            lost[part] = power if takes else np.where(bounded, power, 0.0)
         return lost
 
     @cached_property
@@ -295,7 +299,7 @@ class TorsionalCalculation(Mapping[str, ShaftVibration]):
         most = [
             (part, float(power.max()), float(self.speeds[power.argmax()])) for part, power in self.power_lost.items()
         ]
-        least = TYPED * max((power for _, power, _ in most), default=0.0)  # the rest is rounding
+        least = TYPED * max((power for _, power, _ in most if np.isfinite(power)), default=0.0)  # the rest is rounding
         return tuple(sorted((one for one in most if one[1] > least), key=lambda one: -one[1]))
 
     def to_pandas(self) -> pd.DataFrame:
@@ -339,5 +343,7 @@ class TorsionalCalculation(Mapping[str, ShaftVibration]):
 
 def _mean_power(through: Complex, across: Complex, sign: float) -> Array:
     """(n,) over a cycle, in W; of orders without a bound infinite."""
-    parts = np.where(np.isfinite(through) & np.isfinite(across), sign * (np.conj(through) * across).real / 2, np.inf)
+    with np.errstate(invalid="ignore"):  # of orders without a bound
+        power = sign * (np.conj(through) * across).real / 2
+    parts = np.where(np.isfinite(through) & np.isfinite(across), power, np.inf)
     return np.asarray(parts.sum(axis=1))
