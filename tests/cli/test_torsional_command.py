@@ -35,12 +35,14 @@ def test_the_command_prints_the_calculation_of_the_library(
 ) -> None:
     section = "shaft; diameter=0.07; design=intermediate, flange; strength=500e6"
     line = ["torsional", train, "--speeds", SPEEDS, "--cross-section", section, "--rated", "900"]
+    line += ["--permissible", "shaft=1.5 kN*m"]
     assert main([*line, "--csv", str(tmp_path / "response.csv"), "--out", str(tmp_path / "out")]) == DONE
     calculation = sw.torsional_calculation(
         sw.Network.load(train),
         np.linspace(300, 900, 13) / RPM,
         sections=[Section("shaft", diameter=0.07, design="intermediate, flange", strength=500e6)],
         rated=900 / RPM,
+        permissible={"shaft": 1500.0},
     )
     printed = capsys.readouterr().out
     assert str(calculation) in printed
@@ -78,6 +80,11 @@ def test_machines_read_the_same(train: str, capsys: pytest.CaptureFixture[str]) 
         (["--speeds", SPEEDS, "--cross-section", "shaft; diameter"], "write name=value"),
         (["--speeds", SPEEDS, "--cross-section", "shaft; diameter=wide"], "'wide' must be a number in SI"),
         (["--speeds", SPEEDS, "--misfire", "oil"], "There are: gas"),
+        (["--speeds", SPEEDS, "--permissible", "shat=3"], "permissible: 'shat' is no spring or shaft here"),
+        (["--speeds", SPEEDS, "--cross-section", "shaft; design=propeller; strength=5e8"], "Give --rated, the maximum"),
+            ["--speeds", SPEEDS, "--cross-section", "shaft; design=propeller; strength=500e6"],
+            "Give --rated, the maximum continuous",
+        ),
         (["--speeds", SPEEDS, "--misfire", "gas=none"], "write a share from 0 to 1"),
         (["--speeds", SPEEDS, "--misfire", "gas", "--misfire", "gas"], "--misfire gives 'gas' twice"),
     ],

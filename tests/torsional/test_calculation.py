@@ -38,9 +38,9 @@ def test_waves_give_what_exact_shafts_give() -> None:
             part = next(part for part in net.parts if part.name == name)
             net.replace(part.changed(damping=0.0, model=sw.Wave() if net is lossless[0] else sw.Lumped(4)))
     n = speeds(20.0, 90.0, 5)
-    waves, exact = (
-        sw.torsional_calculation(net, n, exact=k == 1).orders_of("second.tau_a") for k, net in enumerate(lossless)
-    )
+    calculations = [sw.torsional_calculation(net, n, exact=k == 1) for k, net in enumerate(lossless)]
+    # the speeds of peaks, which each looks for, differ by its rounding
+    waves, exact = (one.orders_of("second.tau_a")[np.isin(one.speeds, n)] for one in calculations)
     assert waves == pytest.approx(exact, rel=1e-9)  # the same equations
 
 

@@ -11,6 +11,7 @@ import pytest
 import shaftwork as sw
 from shaftwork.torsional import DESIGNS, Section
 from shaftwork.torsional.barred_ranges import barred_ranges, overlapping
+from tests.torsional.trains import engine, speeds
 
 MPA = 1e6
 
@@ -128,3 +129,17 @@ def test_a_ratio_that_is_no_speed_has_no_limit(ratio: Any) -> None:
     section = sw.torsional.Section("s", diameter=0.1, design="propeller", strength=5e8)
     with pytest.raises(sw.ParameterError, match="must be speeds over the rated one, 0 or more"):
         section.permitted(ratio)
+
+
+def test_a_barred_range_does_not_depend_on_the_speeds_that_are_given() -> None:
+    """Peaks between them are looked for, so a coarse list has the critical speed of a fine one."""
+    section = Section("s3", diameter=0.08, design="intermediate, flange", strength=560e6)
+    by_count = []
+    for count in (7, 31, 161, 801):
+        calculation = sw.torsional_calculation(engine(), speeds(count=count), sections=[section], rated=300.0)
+        shaft = calculation["s3"]
+        by_count.append([shaft.stress.max(), shaft.speeds[shaft.peak]])
+        by_count[-1] += [speed for one in shaft.barred for speed in (one.start, one.end, *one.critical)]
+    assert len(by_count[0]) == 2 + 2 * 3  # two ranges
+    for others in by_count[1:]:
+        assert others == pytest.approx(by_count[0], rel=1e-5)  # parabolas through the last quarter of a spacing

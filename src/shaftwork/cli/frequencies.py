@@ -105,6 +105,8 @@ def calculation_options(parser: ArgumentParser) -> None:
     )
     parser.add_argument("--cross-section", metavar="NAME;KEY=X;...", action="append", default=[], help=section)
     parser.add_argument("--rated", metavar="N", type=float, help="maximum continuous speed in 1/min, for limits")
+    permissible = "vibratory torque in N m, or with its unit, that the part NAME bears; as often as needed"
+    parser.add_argument("--permissible", metavar="NAME=X", action="append", default=[], help=permissible)
     misfire = "a cylinder without swing, or with a share of it; as often as needed"
     parser.add_argument("--misfire", metavar="NAME[=SHARE]", action="append", default=[], help=misfire)
     parser.add_argument("--exact", action="store_true", help="shafts as they are, without a mesh")
@@ -122,10 +124,17 @@ def calculation_of(options: Namespace, net: Network) -> TorsionalCalculation:
 
     if options.speeds is None:
         raise ParameterError("A torsional calculation needs speeds of the shaft in 1/min, such as --speeds 300:900:61.")
+    sections = [_section(text) for text in options.cross_section]
+    if options.rated is None and (bare := [one.shaft for one in sections if one.design is not None]):
+        raise ParameterError(
+            f"The cross-section of '{bare[0]}' has a design, whose permitted stress depends on the rated speed. Give "
+            "--rated, the maximum continuous speed in 1/min."
+        )
     return torsional_calculation(
         net,
         speeds_in(options.speeds),
-        sections=[_section(text) for text in options.cross_section],
+        sections=sections,
+        permissible=point(options.permissible, option="--permissible"),
         rated=None if options.rated is None else options.rated / RPM,
         misfire=once("--misfire", map(_misfire, options.misfire)) or None,
         exact=options.exact,

@@ -133,8 +133,10 @@ def _contents(options: Namespace, net: Network) -> dict[str, Any]:
         contents |= {"speeds": speeds_in(options.speeds), "orders": options.orders}
     if options.torsional:
         contents["torsional"] = calculation_of(options, net)
-    elif options.cross_section or options.misfire or options.rated is not None or options.exact:
-        raise ParameterError("--cross-section, --rated, --misfire and --exact are of --torsional. Give it, too.")
+    elif options.cross_section or options.permissible or options.misfire or options.rated is not None or options.exact:
+        raise ParameterError(
+            "--cross-section, --permissible, --rated, --misfire and --exact are of --torsional. Give it, too."
+        )
     return contents
 
 

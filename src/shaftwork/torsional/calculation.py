@@ -26,7 +26,7 @@ from shaftwork.torsional.torsional_result import TorsionalCalculation
 from shaftwork.torsional.undamped_resonances import without_bound
 
 if TYPE_CHECKING:
-    from shaftwork.torsional.forced_train import ForcedTrain
+    from shaftwork.torsional.forced_train import ForcedTrain, Resonance
 
 
 def torsional_calculation(
@@ -81,13 +81,11 @@ def torsional_calculation(
         )
     resonances = train.resonances(rising)
     n = _refined(rising, [(one.speed, one.damping) for one in resonances])
-    amplitudes = train.amplitudes(n, tuple(shafts.values()))
-    vibrations: dict[str, ShaftVibration] = {}
-    for shaft, torque in shafts.items():
-        swings = without_bound(amplitudes[torque], train, n, resonances)
-        torques, places = worst_along(swings, train.orders, train.places(torque))
-        vibration = ShaftVibration(shaft, n, train.orders, torques, places, of_shafts.get(shaft), None)
-        vibrations[shaft] = _judged(vibration, train, torque, top, bounds.get(shaft))
+    n = _distinct([*n, *_peaks(n, _vibrations(train, shafts, n, resonances), train, shafts)])
+    vibrations = {
+        shaft: _judged(replace(vibration, section=of_shafts.get(shaft)), train, shafts[shaft], top, bounds.get(shaft))
+        for shaft, vibration in _vibrations(train, shafts, n, resonances).items()
+    }
     return TorsionalCalculation(net.name, n, train.orders, vibrations, resonances, top, train.failing, train, shafts)
 
 
@@ -160,8 +158,54 @@ def _refined(speeds: Array, resonances: Sequence[tuple[float, float]]) -> Array:
     from shaftwork.torsional.forced_train import SPREAD
 
     beside = [speed * (1 + damping * step) for speed, damping in resonances for step in (SPREAD if damping else (0.0,))]
-    n = np.unique(np.concatenate([speeds, [speed for speed in beside if speeds[0] <= speed <= speeds[-1]]]))
+    return _distinct([*speeds, *(speed for speed in beside if speeds[0] <= speed <= speeds[-1])])
+
+
+def _distinct(speeds: Sequence[float]) -> Array:
+    """The speeds, ascending, each once."""
+    n = np.unique(speeds)
     return np.asarray(n[np.concatenate([[True], np.diff(n) > TYPED * n[1:]])])
+
+
+def _vibrations(
+    train: ForcedTrain, shafts: Mapping[str, str], speeds: Array, resonances: Sequence[Resonance]
+) -> dict[str, ShaftVibration]:
+    """The vibration of every shaft, whose torques have these names, at speeds (n,)."""
+    amplitudes = train.amplitudes(speeds, tuple(shafts.values()))
+    vibrations = {}
+    for shaft, torque in shafts.items():
+        swings = without_bound(amplitudes[torque], train, speeds, resonances)
+        torques, places = worst_along(swings, train.orders, train.places(torque))
+        vibrations[shaft] = ShaftVibration(shaft, speeds, train.orders, torques, places, None, None)
+    return vibrations
+
+
+def _peaks(
+    speeds: Array, vibrations: Mapping[str, ShaftVibration], train: ForcedTrain, shafts: Mapping[str, str]
+) -> Array:
+    """(p,) the speeds of the peaks of all shafts between speeds (n,) that show one, of a tenth of the largest or more.
+
+    All are halved in at once between their neighbours, as a speed costs less beside others; at last a parabola has the
+    speed to about 1e-5, and its height to the square of that.
+    """
+    tops = []
+    for shaft, vibration in vibrations.items():
+        size = vibration.amplitude
+        least = 0.1 * size[np.isfinite(size)].max(initial=0.0)
+        inner = (size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:]) & np.isfinite(size[1:-1]) & (size[1:-1] >= least)
+        tops += [(shaft, place + 1) for place in np.flatnonzero(inner).tolist()]
+    low, high = (np.array([speeds[place + side] for _, place in tops]) for side in (-1, 1))
+    places, rows = np.array([0.25, 0.5, 0.75]), np.arange(len(tops))
+    for _ in range(4 if tops else 0):
+        between = low[:, None] + (high - low)[:, None] * places
+        every, where = np.unique(between, return_inverse=True)
+        at = _vibrations(train, shafts, every, ())
+        size = np.array([at[shaft].amplitude[row] for (shaft, _), row in zip(tops, where.reshape(-1, 3), strict=True)])
+        width, middle = high - low, between[rows, size.argmax(axis=1)]
+        bend = 2 * size[:, 1] - size[:, 0] - size[:, 2]
+        vertex = between[:, 1] + width / 8 * (size[:, 2] - size[:, 0]) / np.where(bend > 0.0, bend, np.inf)
+        low, high = middle - width / 4, middle + width / 4
+    return np.clip(vertex, low, high) if tops else np.empty(0)
 
 
 def _judged(

@@ -110,7 +110,7 @@ class ShaftVibration:
         if not np.isfinite(self.amplitude).all():
             verdicts.append("NO BOUND where nothing damps")
         if self.limits is not None:
-            allowed = "with a barred range" if all(one.allowed for one in self.barred) else "NOT permitted"
+            allowed = "permitted with a barred range" if all(one.allowed for one in self.barred) else "NOT permitted"
             verdicts.append(allowed if self.barred else "below tau_c at all speeds")
         if self.permissible is not None:
             verdicts.append(f"{'ABOVE' if self.exceeded else 'below'} the permissible torque")

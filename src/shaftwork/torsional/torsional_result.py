@@ -229,13 +229,13 @@ class TorsionalCalculation(Mapping[str, ShaftVibration]):
 
     @cached_property
     def modes(self) -> HolzerTable:
-        """The modes up to the highest excitation as Holzer tables.
+        """The modes up to half as high again as the highest excitation as Holzer tables.
 
         Where they depend on the speed, they are those about the operating point of the highest speed, which the title
         says; `train.modes(speed, f_max)` has those about another.
         """
         speed = float(self.speeds[-1])
-        top = max(self.orders) * speed / (2 * np.pi)
+        top = 1.5 * max(self.orders) * speed / (2 * np.pi)
         sections = [one.section for one in self.shafts.values() if one.section is not None]
         holzer = holzer_table(self.train.modes(speed, top), self.torques, sections)
         about = (
