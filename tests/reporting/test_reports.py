@@ -426,7 +426,7 @@ def test_the_command_writes_the_files_of_a_report(tmp_path: Path, monkeypatch: p
     line = ["report", "crane-start", "--set", "J1.J=30", "--tex", "--author", "B", "--text", "conclusions=words.md"]
     assert main([*line, "--sections", "parts,drawing", "--out", "signed"]) == 0
     names = {path.name for path in Path("signed").iterdir()}
-    assert names == {"report.tex", "report-train.pdf", "report-circuit.pdf", "shaftwork.json"}
+    assert names == {"report.tex", *(f"report-{name}.pdf" for name in ("train", "circuit", "dual")), "shaftwork.json"}
     text = Path("signed/report.tex").read_text(encoding="utf-8")
     assert "$30$" in text
     assert r"It \textbf{holds}." in text
@@ -460,3 +460,14 @@ def test_what_is_asked_for_is_in_the_report_or_refused(contents: dict[str, Any],
     net.add(sw.Inertia("J2", J=3.0), "wheel")
     with pytest.raises(sw.ShaftworkError, match=re.escape(message)):
         sw.report(net, **contents)
+
+
+def test_modes_that_swing_come_first_and_the_dual_circuit_is_drawn() -> None:
+    """A shaft in elements has more decays than modes that swing, and lower ones."""
+    report = sw.report(SCENES["ship-engine"], sections=["drawing", "frequencies"], t_end=0.05)
+    assert "dual" in report.figures
+    rows = re.findall(r"(?:mode|decay) \d+ & \$([\d.]+)\$ & ", dict(report.sections)["Natural frequencies"])
+    frequencies = [float(value) for value in rows]
+    assert len(frequencies) > 5
+    swinging = [value > 0 for value in frequencies]
+    assert swinging == sorted(swinging, reverse=True)

@@ -8,7 +8,7 @@ from dataclasses import fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from shaftwork.components.shafts import Shaft
-from shaftwork.core.errors import ModelFileError
+from shaftwork.core.errors import ModelFileError, NetworkError
 from shaftwork.equations.spelling import in_text, without_marks
 from shaftwork.latex.document import section as printed_section
 from shaftwork.latex.nomenclature import breakable, condensed, laws, parameters, variables
@@ -18,8 +18,10 @@ from shaftwork.reporting.latex_parts import columns, listed, number, paragraphs,
 from shaftwork.reporting.subject import ReportSection, Subject
 
 if TYPE_CHECKING:
+    from shaftwork.drawing.canvas import Drawing
     from shaftwork.equations.records import Equations
     from shaftwork.latex.blocks import Block
+    from shaftwork.pipeline.network import Network
 
 COLUMNS = 96
 """Letters of a line of the model file, which a page has room for."""
@@ -28,12 +30,12 @@ MOST_DRAWN = 60
 
 
 def drawing(subject: Subject) -> ReportSection:
-    """The drive train and its analogue circuit."""
+    """The drive train, its analogue circuit and, where there is one that can be read, the dual circuit."""
     if len(subject.network.parts) > MOST_DRAWN:
         return ReportSection(
             notes=(f"Drawings of more than {MOST_DRAWN} parts cannot be read on a page and are left out.",)
         )
-    figures = {"train": subject.network.draw(), "circuit": subject.network.draw(as_circuit=True)}
+    figures = {"train": _on_a_page(subject.network), "circuit": _on_a_page(subject.network, as_circuit=True)}
     analogy = (
         "In the analogue circuit speed is voltage and torque is current: an inertia is a capacitor, a compliance an "
         "inductor, a damper a resistor."
@@ -41,7 +43,26 @@ def drawing(subject: Subject) -> ReportSection:
     text = paragraphs(
         picture("train", "Drive train"), in_text(analogy), picture("circuit", "Analogue circuit (speed as voltage)")
     )
-    return ReportSection(text, figures)
+    try:
+        dual = subject.network.dual()
+    except NetworkError as reason:
+        why = str(reason.problems[0]) if reason.problems else str(reason)
+        return ReportSection(text, figures, notes=(f"The dual circuit is left out, as there is none: {why}",))
+    if len(dual.parts) > MOST_DRAWN:
+        return ReportSection(text, figures)
+    figures["dual"] = _on_a_page(subject.network, as_circuit=True, analogy="force-voltage")
+    words = in_text("In the dual circuit torque is voltage and speed is current: an inertia is an inductor.")
+    return ReportSection(paragraphs(text, words, picture("dual", "Dual circuit (torque as voltage)")), figures)
+
+
+def _on_a_page(network: Network, **form: Any) -> Drawing:
+    """A drawing whose rows are as long as it needs to be no higher than a page, with the largest letters possible."""
+    for width in (680.0, 900.0, 1200.0, 1600.0):
+        drawing = network.draw(width=width, **form)
+        left, bottom, right, top = drawing.size
+        if top - bottom <= 1.2 * (right - left):
+            break
+    return drawing
 
 
 def parts(subject: Subject) -> ReportSection:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from shaftwork.core.errors import ParameterError, ShaftworkError
@@ -24,12 +25,14 @@ def frequencies(subject: Subject) -> ReportSection:
         if subject.at is not None:
             raise  # it is what the user asked for
         return ReportSection(notes=(f"Natural frequencies are left out: {reason}",))
+    first = sorted(modes.table, key=lambda row: row[3].imag <= 0)  # those that swing
     rows = [
         (in_text(name), number(f), number(60 * f), number(damping, 4), in_text(node))
-        for name, f, damping, _, node in modes.table[:MOST_MODES]
+        for name, f, damping, _, node in first[:MOST_MODES]
     ]
-    more = f"The {MOST_MODES} lowest of {len(modes)} modes." if len(modes) > MOST_MODES else ""
-    swings = bool((modes.rates.imag > 0).any())
+    swinging = sum(row[3].imag > 0 for row in first)
+    more = f"{swinging} of {len(first)} modes swing, the others decay. The table has the first {MOST_MODES} of them."
+    more, swings = more if len(first) > MOST_MODES else "", swinging > 0
     shapes = picture("modes", "Speeds of the nodes in the lowest modes") if swings else ""
     heads = ("Mode", "Frequency in Hz", "in 1/min", "Damping ratio", "Moves most")
     text = paragraphs(in_text(f"{modes.title}."), in_text(more), columns(heads, rows, (4, 3, 3, 3, 3)), shapes)
@@ -75,7 +78,7 @@ def torsional(subject: Subject) -> ReportSection:
     )
     text = paragraphs(
         _limits_in_print(f"{calculation.heading}. {rule}"),
-        columns(heads, rows, (3, *(1.5 for _ in heads[2:]), 4)),
+        *_split(heads, rows),
         _with_letters(listed(tuple(map(_with_squares, calculation.notes)))),
         picture("torsional", "Vibratory stress or torque over the speed, with the permitted stresses"),
         _resonances(calculation),
@@ -83,6 +86,15 @@ def torsional(subject: Subject) -> ReportSection:
         _heat(calculation),
     )
     return ReportSection(text, {"torsional": calculation.plot(*judged)})
+
+
+def _split(heads: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
+    """The table of shafts as one of torques with the verdict, and one of stresses where there are any."""
+    stresses = [k for k, head in enumerate(heads) if "mm" in head]
+    torques = [k for k in range(len(heads)) if k not in stresses]
+    for chosen in (torques, [0, *stresses] if stresses else []):
+        shares = [{0: 3, len(heads) - 1: 4}.get(k, 2) for k in chosen]
+        yield columns([heads[k] for k in chosen], [[row[k] for k in chosen] for row in rows], shares) if chosen else ""
 
 
 def _limits_in_print(text: str) -> str:
@@ -96,13 +108,15 @@ def _with_squares(text: str) -> str:
 
 def _with_letters(latex: str) -> str:
     for limit in ("c", "t"):
-        latex = latex.replace(rf"$\mathrm{{tau\_{limit}}}$", rf"$\tau_{limit}$")
+        latex = latex.replace(rf"tau\_{limit}", rf"$\tau_{limit}$")
     return latex
 
 
 def _holzer(mode: Any) -> str:
     """A mode as Holzer's table: amplitudes and torques of the masses, torques and stresses of the shafts."""
-    title = f"{mode.name}: {mode.frequency:.5g} Hz, damping {mode.damping:.3g}, for 1 rad of {mode.measure}"
+    title = (
+        f"{mode.name.capitalize()}: {mode.frequency:.5g} Hz, damping {mode.damping:.3g}, for 1 rad of {mode.measure}"
+    )
     masses = [(breakable(one.name), number(one.amplitude), number(one.torque / 1e3)) for one in mode.masses]
     shafts = [
         (breakable(one.name), number(one.torque / 1e3), "--" if one.stress is None else number(one.stress / 1e6))
