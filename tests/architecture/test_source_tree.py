@@ -54,8 +54,7 @@ def test_every_class_has_a_name_of_its_own() -> None:
         for node in ast.walk(tree(file)):
             if isinstance(node, ast.ClassDef):
                 places.setdefault(node.name, []).append(place(file, node))
-    # how a part works, for authors of parts, and the free motions of a network: users know both by this name
-    assert {name: found for name, found in places.items() if len(found) > 1 and name != "Modes"} == {}
+    assert {name: found for name, found in places.items() if len(found) > 1} == {}
 
 
 def test_95_percent_of_the_functions_have_at_most_40_lines() -> None:

@@ -29,7 +29,7 @@ from shaftwork.formulation.value_diagnosis import speeds_along
 from shaftwork.frequency import campbell as diagram
 from shaftwork.frequency.linear_model import ExactModel, LinearModel, linear_model
 from shaftwork.frequency.linearization import Linearization
-from shaftwork.frequency.natural_modes import MOVES, Modes
+from shaftwork.frequency.natural_modes import MOVES, NaturalModes
 from shaftwork.network.graph import GROUND, CircuitGraph, Reading, readings_of
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import listed
@@ -329,7 +329,7 @@ def campbell(
     if at is None:
         refuse_no_point(model, "A Campbell diagram")
 
-    def modes(speed: float, f_max: float) -> tuple[Modes, str]:
+    def modes(speed: float, f_max: float) -> tuple[NaturalModes, str]:
         near = small_motions(at(speed) if callable(at) else at, t, ())
         limit = None if isinstance(near, LinearModel) or count is not None else f_max
         return near.modes(count, limit), near.phase

@@ -14,7 +14,7 @@ from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
 from shaftwork.core.screen import counted, in_lines
 from shaftwork.frequency.modes_over_speed import BEYOND, Meeting, OverSpeed, Swinging, differing, numbered
-from shaftwork.frequency.natural_modes import Modes
+from shaftwork.frequency.natural_modes import NaturalModes
 from shaftwork.results.observer import RPM, Array, array_in_si
 from shaftwork.results.plotting import new_figure
 
@@ -93,7 +93,7 @@ class Campbell:
 
 def campbell(
     title: str,
-    modes_at: Callable[[float, float], tuple[Modes, str]],
+    modes_at: Callable[[float, float], tuple[NaturalModes, str]],
     speeds: Any,
     orders: Any,
     f_max: float | None,

@@ -31,7 +31,7 @@ from shaftwork.frequency.analysis import (
 from shaftwork.frequency.exact_lines import ExactLines, ExactSlopes
 from shaftwork.frequency.linear_model import ExactModel
 from shaftwork.frequency.linearization import Linearization
-from shaftwork.frequency.natural_modes import Modes, find_modes
+from shaftwork.frequency.natural_modes import NaturalModes, find_modes
 from shaftwork.network.graph import resolve
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import Names, Point, Time
@@ -184,7 +184,7 @@ class ExactNetwork:
         ]
         return Linearization(self._open, self._open.vector(), x, time, inputs, np.array(arriving))
 
-    def _starts(self, values: Mapping[str, float], time: float, radius: float, attempt: int) -> Modes:
+    def _starts(self, values: Mapping[str, float], time: float, radius: float, attempt: int) -> NaturalModes:
         """The modes of the network with meshes that are right for |rate| up to a radius."""
         model = self._meshed(radius, attempt)
         torques = tuple(f"{name}.tau_{end}" for name in self.lines.names for end in "ab")

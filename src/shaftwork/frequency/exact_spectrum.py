@@ -17,7 +17,14 @@ from shaftwork.core.errors import NetworkWarning, ParameterError, SimulationErro
 from shaftwork.core.notices import warn
 from shaftwork.frequency.exact_lines import ExactSlopes
 from shaftwork.frequency.frequency_response import solved_densely
-from shaftwork.frequency.natural_modes import EQUAL, Modes, checked_count, largest_rate, modes_of, states_that_act
+from shaftwork.frequency.natural_modes import (
+    EQUAL,
+    NaturalModes,
+    checked_count,
+    largest_rate,
+    modes_of,
+    states_that_act,
+)
 from shaftwork.results.observer import Array, Complex, blocks
 
 MODES = 10
@@ -26,7 +33,7 @@ WIDER = 1.3
 """The mesh is right up to so many times the largest rate wanted: the circle for the count passes a gap between."""
 BELOW = 0.5
 """Modes are sought up to this fraction of the rate at which, without number, they crowd."""
-Starts = Callable[[float, int], Modes]
+Starts = Callable[[float, int], NaturalModes]
 """The modes of the network with meshes that are right for |rate| up to a radius, the finer the later the attempt."""
 
 
@@ -167,7 +174,7 @@ def _basis(matrix: Complex, vectors: Complex) -> Complex:
 
 def find_exact_modes(
     title: str, slopes: ExactSlopes, starts: Starts, count: int | None = None, f_max: float | None = None
-) -> Modes:
+) -> NaturalModes:
     """The modes of smallest |rate|; see `ExactModel.modes`."""
     wanted, limit = checked_count(count), min(BELOW * slopes.lines.crowding, _echo_limit(slopes))
     if f_max is not None:
@@ -202,7 +209,7 @@ def _echo_limit(slopes: ExactSlopes) -> float:
     return 3.0 * np.pi / float(lines.delay.max())
 
 
-def _lowest(modes: Modes, count: int | None) -> Modes:
+def _lowest(modes: NaturalModes, count: int | None) -> NaturalModes:
     lowest = np.argsort(np.abs(modes.rates), kind="stable")[:count]
     return modes_of(modes.title, modes.slopes, modes.rates[lowest], modes.vectors[:, lowest])
 
@@ -225,7 +232,7 @@ def _stop(slopes: ExactSlopes, limit: float, wanted: str) -> None:
     )
 
 
-def _settled(title: str, slopes: ExactSlopes, starts: Starts, radius: float) -> Modes:
+def _settled(title: str, slopes: ExactSlopes, starts: Starts, radius: float) -> NaturalModes:
     """All modes with |rate| up to a radius."""
     states, weights = len(slopes.open.states), slopes.weights[:, None]
     problem, acting, following = _problem(slopes)
@@ -291,7 +298,7 @@ def _together(starts: Complex) -> list[list[int]]:
     return groups
 
 
-def _standing(slopes: ExactSlopes, mesh: Modes, columns: NDArray[np.intp]) -> Complex:
+def _standing(slopes: ExactSlopes, mesh: NaturalModes, columns: NDArray[np.intp]) -> Complex:
     """What does not change at all, in which nothing moves along a shaft: as on the mesh, (n, k)."""
     places = {name: k for k, name in enumerate(mesh.slopes.states)}
     rows = [mesh.vectors[places[name]] if name in places else mesh.shapes[name] for name in slopes.open.states]

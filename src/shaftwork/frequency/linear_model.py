@@ -17,7 +17,7 @@ from shaftwork.frequency.exact_lines import ExactSlopes
 from shaftwork.frequency.exact_spectrum import ExactProblem, Starts, find_exact_modes
 from shaftwork.frequency.frequency_response import FrequencyResponse, StateEquations, frequency_response
 from shaftwork.frequency.linearization import Linearization
-from shaftwork.frequency.natural_modes import Modes, find_modes
+from shaftwork.frequency.natural_modes import NaturalModes, find_modes
 from shaftwork.results.observer import Array
 
 
@@ -118,7 +118,7 @@ class LinearModel:
         rows = [x[places[name]] if name in places else read(name).real for name in self.outputs]
         return np.array(rows).reshape(len(self.outputs), x.shape[1])
 
-    def modes(self, count: int | None = None, f_max: float | None = None) -> Modes:
+    def modes(self, count: int | None = None, f_max: float | None = None) -> NaturalModes:
         """Frequencies, damping and shapes of the free motions.
 
         Args:
@@ -167,7 +167,7 @@ class ExactModel:
     starts: Starts
     phase: str = ""
 
-    def modes(self, count: int | None = None, f_max: float | None = None) -> Modes:
+    def modes(self, count: int | None = None, f_max: float | None = None) -> NaturalModes:
         """Frequencies, damping and shapes of the free motions.
 
         Args:

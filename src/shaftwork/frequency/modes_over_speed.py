@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import brentq, linear_sum_assignment
 
-from shaftwork.frequency.natural_modes import EQUAL, Modes, natural_frequencies
+from shaftwork.frequency.natural_modes import EQUAL, NaturalModes, natural_frequencies
 from shaftwork.results.observer import Array, Complex
 
 BEYOND = 1.2
@@ -17,7 +17,7 @@ BEYOND = 1.2
 BETWEEN = ", "
 """Between the modes of the parts in the words of a phase."""
 
-ModesAt = Callable[[float], tuple[Modes, str]]
+ModesAt = Callable[[float], tuple[NaturalModes, str]]
 """From a speed in rad/s to the modes there and the phase that they belong to."""
 
 
@@ -49,7 +49,7 @@ class Swinging:
         return self.frequencies - order * self.speed / (2 * np.pi)
 
 
-def swinging(speed: float, modes: Modes, phase: str, f_max: float) -> Swinging:
+def swinging(speed: float, modes: NaturalModes, phase: str, f_max: float) -> Swinging:
     """The modes at a speed that swing, up to a frequency in Hz."""
     swings = (modes.rates.imag > 0) & (modes.frequencies <= f_max)
     vectors = modes.vectors[:, swings] * modes.slopes.weights[:, None]

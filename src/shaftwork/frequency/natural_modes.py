@@ -34,7 +34,7 @@ MOVES = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Modes:
+class NaturalModes:
     """The free motions of a network near a point, each x(t) = Re(shape exp(rate t)).
 
     In order: what does not change at all (rigid-body modes, constant torques in closed loops), what decays or grows
@@ -149,7 +149,7 @@ class Modes:
 class _Shapes(Mapping[str, Complex]):
     """Amplitudes by quantity, computed when read."""
 
-    def __init__(self, modes: Modes, read: Callable[[str], Complex]) -> None:
+    def __init__(self, modes: NaturalModes, read: Callable[[str], Complex]) -> None:
         self._title, self._slopes, self._read = modes.title, modes.slopes, read
 
     def __getitem__(self, name: str) -> Complex:
@@ -167,7 +167,7 @@ class _Shapes(Mapping[str, Complex]):
         return len({**self._slopes.units, **self._slopes.profiles})
 
 
-def find_modes(title: str, slopes: Linearization, count: int | None = None, f_max: float | None = None) -> Modes:
+def find_modes(title: str, slopes: Linearization, count: int | None = None, f_max: float | None = None) -> NaturalModes:
     """The modes of a network near a point, the eigenvalues and eigenvectors of A; see `LinearModel.modes`."""
     count, top = checked_count(count), largest_rate(f_max)
     acting, following = states_that_act(slopes.angles, slopes.A)
@@ -212,7 +212,7 @@ def checked_count(count: int | None) -> int | None:
     return None if count is None else number
 
 
-def modes_of(title: str, slopes: Motions, rates: Complex, vectors: Complex) -> Modes:
+def modes_of(title: str, slopes: Motions, rates: Complex, vectors: Complex) -> NaturalModes:
     """The record of motions that go as exp(rate t): in order, with names, each of size one.
 
     Args:
@@ -223,7 +223,7 @@ def modes_of(title: str, slopes: Motions, rates: Complex, vectors: Complex) -> M
     """
     order = np.lexsort((np.abs(rates), rates.imag > 0, rates != 0))
     rates, vectors = rates[order], _scaled(slopes, rates[order], vectors[:, order])
-    return Modes(title, _names(slopes, rates, vectors), rates, vectors, slopes)
+    return NaturalModes(title, _names(slopes, rates, vectors), rates, vectors, slopes)
 
 
 def states_that_act(angles: int, *matrices: Any) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -292,7 +292,7 @@ def _standing(slopes: Motions, vectors: Complex) -> Iterator[str]:
         yield f"rigid body of {listed}" if moving else f"constant in {listed}"
 
 
-def _largest_nodes(modes: Modes) -> list[str]:
+def _largest_nodes(modes: NaturalModes) -> list[str]:
     amplitudes = np.array([np.abs(modes.shapes[name]) for name in modes.slopes.nodes])
     names = [name.rpartition(".")[0] for name in modes.slopes.nodes]
     if not names:
@@ -301,7 +301,7 @@ def _largest_nodes(modes: Modes) -> list[str]:
     return [names[k] if amplitudes[k, mode] > 0 else "" for mode, k in enumerate(largest)]
 
 
-def _plot(modes: Modes, numbers: tuple[int, ...]) -> Figure:
+def _plot(modes: NaturalModes, numbers: tuple[int, ...]) -> Figure:
     figure = new_figure("Modes.plot()", 9.0, 1.0 + 1.5 * len(numbers), f"{modes.title}: speeds of the nodes")
     axes = np.atleast_1d(figure.subplots(len(numbers), 1, sharex=True))
     nodes = modes.slopes.nodes

@@ -20,7 +20,7 @@ from shaftwork.core.errors import ShaftworkError, SimulationError, no_quantity
 from shaftwork.core.notices import FILTERS
 from shaftwork.core.screen import MOST_MODES
 from shaftwork.frequency.exact_networks import exact_shafts
-from shaftwork.frequency.natural_modes import Modes
+from shaftwork.frequency.natural_modes import NaturalModes
 from shaftwork.live.page_requests import checked, objections
 from shaftwork.live.sliders import Slider, StartField, sliders_of, start_fields_of
 from shaftwork.live.stage import described, moved
@@ -300,7 +300,7 @@ class Session:
             ]
         }
 
-    def _modes_about(self, values: Mapping[str, Any], point: Solution | None) -> Modes:
+    def _modes_about(self, values: Mapping[str, Any], point: Solution | None) -> NaturalModes:
         if exact_shafts(self.model.netlist, every=False):  # waves are in no matrix
             return with_values(self.network, values).modes(point)
         return self.model.linearize(point, parameters=values).modes()

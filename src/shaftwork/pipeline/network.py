@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from shaftwork.frequency.analysis import SmallMotions
     from shaftwork.frequency.campbell import Campbell
     from shaftwork.frequency.frequency_response import FrequencyResponse
-    from shaftwork.frequency.natural_modes import Modes
+    from shaftwork.frequency.natural_modes import NaturalModes
     from shaftwork.lagrange.lagrange import Lagrangian
 
 LOOP = "algebraic loop"
@@ -170,7 +170,7 @@ class Network(NetworkBuilder):
         f_max: float | None = None,
         exact: bool = False,
         t: Time = None,
-    ) -> Modes:
+    ) -> NaturalModes:
         """Natural frequencies, damping and shapes, at rest or about a point.
 
         Args:

@@ -29,7 +29,7 @@ from shaftwork.results.solution import Solution
 from shaftwork.studies.stability_cases import TORQUE, Case
 
 if TYPE_CHECKING:
-    from shaftwork.frequency.natural_modes import Modes
+    from shaftwork.frequency.natural_modes import NaturalModes
 
 QUANTITIES = ("tau_a", "tau_b", "tau_mid", "omega_a", "omega_b")
 """What is compared: torque at both ends and in the middle, speed of both ends."""
@@ -138,7 +138,7 @@ def quantities(solution: Solution, net: Network, shaft: str) -> dict[str, Array]
     return values | {"tau_mid": torques[:, read] @ lagrange}
 
 
-def frequencies(modes: Modes) -> Array:
+def frequencies(modes: NaturalModes) -> Array:
     """The natural frequencies |rate| / 2 pi in Hz of the modes that swing."""
     return modes.frequencies[modes.frequencies > 0]
 

@@ -26,7 +26,7 @@ from shaftwork.frequency.exact_spectrum import ExactProblem
 from shaftwork.frequency.frequency_response import StateEquations, forced_amplitudes
 from shaftwork.frequency.linear_model import ExactModel, LinearModel, linear_model
 from shaftwork.frequency.linearization import Linearization
-from shaftwork.frequency.natural_modes import Modes
+from shaftwork.frequency.natural_modes import NaturalModes
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart, signals_of
 from shaftwork.pipeline.arguments import Point, Time
 from shaftwork.pipeline.compiler import Compiler
@@ -189,7 +189,7 @@ class ForcedTrain:
         profiles = ModelObserver(self.model.form, self.model.bind).profiles
         return profiles[name][1] if name in profiles else ()
 
-    def modes(self, speed: float, f_max: float | None) -> Modes:
+    def modes(self, speed: float, f_max: float | None) -> NaturalModes:
         """The modes about the point of a speed in rad/s, up to a frequency in Hz."""
         near = self._near(speed)
         return near.modes(None, f_max if isinstance(near, ExactModel) else None)
@@ -219,7 +219,7 @@ class ForcedTrain:
             ParameterError: orders or f_max are not what they must be.
         """
 
-        def modes(speed: float, f_max: float) -> tuple[Modes, str]:
+        def modes(speed: float, f_max: float) -> tuple[NaturalModes, str]:
             return self.modes(speed, f_max), self._near(speed).phase
 
         coarse = np.linspace(speeds[0], speeds[-1], COARSE)

@@ -14,7 +14,7 @@ from shaftwork.results.observer import Complex
 from shaftwork.torsional.shaft_sections import MPA, Section
 
 if TYPE_CHECKING:
-    from shaftwork.frequency.natural_modes import Modes
+    from shaftwork.frequency.natural_modes import NaturalModes
 
 
 class HolzerMass(NamedTuple):
@@ -108,7 +108,7 @@ class HolzerTable:
         return "\n".join([self.title, *map(str, self.modes)])
 
 
-def holzer_table(modes: Modes, shafts: Mapping[str, str], sections: Sequence[Section]) -> HolzerTable:
+def holzer_table(modes: NaturalModes, shafts: Mapping[str, str], sections: Sequence[Section]) -> HolzerTable:
     """The table of the modes of a train.
 
     Args:
