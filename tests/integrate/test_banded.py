@@ -15,7 +15,8 @@ import shaftwork as sw
 from shaftwork.core.errors import ParameterError, SimulationError
 from shaftwork.integrate import choice, scipy_ivp, stepping
 from shaftwork.integrate.collocation import banded
-from shaftwork.integrate.collocation.banded_stages import ShiftedMatrix, shifted_collocation
+from shaftwork.integrate.collocation.banded_stages import shifted_collocation
+from shaftwork.integrate.collocation.shifted_matrix import ShiftedMatrix
 from shaftwork.integrate.linear import propagation
 from shaftwork.integrate.problem import LinearInputs, Problem
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from sympy import Expr, Integer
+from sympy import Expr
 
 from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
@@ -182,8 +182,7 @@ class BranchHistory:
         if not template.through:
             return np.asarray(self.across[index])
         ends = dict.fromkeys(end for _, *pair in template.terms for end in pair if end is not None)
-        factors = ((factor, end) for end in ends for factor in self._factors(part, index, end))
-        speeds = (factor * self.potentials[part.nodes[end]] for factor, end in factors)
+        speeds = (self._factor(part, template, end) * self.potentials[part.nodes[end]] for end in ends)
         return np.asarray(sum(speeds, start=np.zeros(len(self.t))))
 
     def signal(self, part: GraphPart, signal: Signal) -> Array:
@@ -222,17 +221,25 @@ class BranchHistory:
 
     def _through_port(self, part: GraphPart, port: str) -> Array:
         """(k,) what the node at a port gives to a part: the sum over the branches that begin or end there."""
-        factors = ((factor, k) for k in part.branches for factor in self._factors(part, k, port))
-        return np.asarray(sum((factor * self.through[k] for factor, k in factors), start=np.zeros(len(self.t))))
+        total = np.zeros(len(self.t))
+        for k in part.branches:
+            template = self.form.graph.branches[k].template
+            if template.terms:
+                total += self._factor(part, template, port) * self.through[k]
+            elif port in template.ends:
+                total += _sign(template.ends, port) * self.through[k]
+        return total
 
-    def _factors(self, part: GraphPart, index: int, port: End) -> Iterator[float]:
-        """With which factors a branch takes its through variable from a port."""
-        template, p = self.form.graph.branches[index].template, self.bound.p
-        values = {s: float(p[part.parameters[s.name]]) for s in template.symbols} if template.balances else {}
-        for coefficient, *ends in template.balances or ((Integer(1), *template.ends),):
-            for sign, end in zip((1.0, -1.0), ends, strict=True):
-                if end == port:
-                    yield sign * float(coefficient.xreplace(values))
+    def _factor(self, part: GraphPart, template: BranchTemplate, port: End) -> float:
+        """With which factor a coupling takes its through variable from a port."""
+        values = {s: float(self.bound.p[part.parameters[s.name]]) for s in template.symbols}
+        there = ((factor, ends) for factor, *ends in template.balances if port in ends)
+        return sum(_sign(ends, port) * float(factor.xreplace(values)) for factor, ends in there)
+
+
+def _sign(ends: Sequence[End], port: End) -> int:
+    """1 where a branch begins at a port, -1 where it ends there."""
+    return (ends[0] == port) - (ends[1] == port)
 
 
 class GivenHistory(BranchHistory):

@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any, Literal
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import splu
 
+from shaftwork.integrate.collocation.shifted_matrix import Complex, ShiftedMatrix, Solver
 from shaftwork.integrate.problem import Array, LinearInputs, Problem
 from shaftwork.integrate.smooth_intervals import GuardedFunctions, SmoothInterval
 from shaftwork.numerics.polynomials import legendre_integrals, radau_nodes, to_integrals, to_legendre
 
-Complex = NDArray[np.complex128]
 Family = Literal["radau", "gauss"]
-Solver = Callable[[Complex], Complex]
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,78 +123,6 @@ def shifted_collocation(family: Family, stages: int) -> ShiftedCollocation:
 
 def _centred(theta: Any) -> Array:
     return 2 * np.atleast_1d(np.asarray(theta, dtype=float)) - 1
-
-
-class ShiftedMatrix:
-    """gamma - J for one sparse J after another and any shifts gamma.
-
-    States that only integrate others (the torque of a spring, an angle) are eliminated: with J = [[A, B], [C, 0]] what
-    is left is gamma - A - B C / gamma, for a chain of springs a tridiagonal matrix of the speeds alone. That halves the
-    time of a long chain, which SuperLU factorises without fill.
-
-    Args:
-        matrix: J, scipy.sparse (n, n).
-    """
-
-    def __init__(self, matrix: Any) -> None:
-        self._pattern: tuple[Any, Any] | None = None
-        self.load(matrix)
-
-    def load(self, matrix: Any) -> None:
-        """Take another J (n, n) for the shifts to come."""
-        matrix = sparse.csr_array(matrix)
-        pattern = matrix.indptr, matrix.indices
-        if self._pattern is None or not all(map(np.array_equal, self._pattern, pattern)):
-            gone = _integrators(matrix)
-            self._pattern, self._rest, self._gone = pattern, np.flatnonzero(~gone), np.flatnonzero(gone)
-        upper, lower = matrix[self._rest], matrix[self._gone]
-        B, C, diagonal = upper[:, self._gone], lower[:, self._rest], np.arange(self._rest.size)
-        A, through = sparse.coo_array(upper[:, self._rest]), sparse.coo_array(B @ C)
-        # Real parts of A, imaginary parts of B C, and room for the shift: one pattern for all shifts.
-        values = np.concatenate([A.data, 1j * through.data, np.zeros(diagonal.size)])
-        rows, columns = (np.concatenate([*pair, diagonal]) for pair in ((A.row, through.row), (A.col, through.col)))
-        self._left = sparse.csc_matrix((values, (rows, columns)), shape=A.shape)
-        self._diagonal = self._left.indices == np.repeat(diagonal, np.diff(self._left.indptr))
-        # products with complex vectors would convert them each time
-        self._B, self._C = B.astype(complex), C.astype(complex)
-
-    def factor(self, shift: complex) -> Solver:
-        """Factorise shift - J; the solver takes and gives complex (n,).
-
-        Raises:
-            LinAlgError: the matrix is singular.
-        """
-        inverse, rest, gone, B, C = 1 / shift, self._rest, self._gone, self._B, self._C
-        left, both = self._left.copy(), self._left.data
-        left.data = -both.real - inverse * both.imag
-        left.data[self._diagonal] += shift
-        try:
-            inner = splu(left).solve
-        except RuntimeError as error:
-            raise np.linalg.LinAlgError(str(error)) from error
-
-        def solve(right: Complex) -> Complex:
-            second = right[gone]
-            solution = np.empty_like(right)
-            remaining = solution[rest] = inner(right[rest] + inverse * (B @ second))
-            solution[gone] = inverse * (second + C @ remaining)
-            return solution
-
-        return solve
-
-
-def _integrators(matrix: Any) -> Any:
-    """States (n,) without an entry of their own that do not read each other, those of few neighbours first."""
-    pattern = sparse.csr_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
-    both = sparse.csr_array(pattern + pattern.T)
-    neighbours = np.diff(both.indptr)
-    few = (neighbours > 0) & (neighbours <= 4)  # elimination joins all of them: a hub of many arms is left in
-    candidates = np.flatnonzero((both.diagonal() == 0) & few)
-    starts, indices = both.indptr.tolist(), both.indices.tolist()
-    chosen = [False] * both.shape[0]
-    for state in candidates[np.argsort(neighbours[candidates], kind="stable")].tolist():
-        chosen[state] = not any(chosen[other] for other in indices[starts[state] : starts[state + 1]])
-    return np.array(chosen, dtype=bool)
 
 
 @dataclass(frozen=True)
