@@ -35,8 +35,8 @@ def solve(problem: Problem) -> Trajectory:
     machine = problem.machine
     if machine is None:
         raise ParameterError(
-            "The engine 'numba' needs equations line by line, without tables, noise and waves, and these are none. "
-            "Take engine='auto'."
+            "The engine 'numba' needs equations line by line, without smooth noise, functions of your own and waves; "
+            "these are not. Take engine='auto'."
         )
 
     def run(problem: Problem, longest: float) -> MarchedRun:
