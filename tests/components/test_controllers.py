@@ -15,7 +15,7 @@ from scipy.signal import TransferFunction, step
 
 import shaftwork as sw
 
-ENGINES = ("scipy", "heyoka", "sundials")
+ENGINES = ("scipy", "numba", "heyoka", "sundials")
 INERTIA, LOSS = 0.5, 0.1
 
 

@@ -17,7 +17,7 @@ from shaftwork.components import Component
 PER_MINUTE = 2 * math.pi / 60
 MOTOR: dict[str, float] = {"tau_k": 8.0, "s_k": 0.3, "n_sync": 3000.0}
 PULL_OUT_LAG = 0.3 * 3000.0  # 1/min
-ENGINES = ("scipy", "heyoka", "sundials")
+ENGINES = ("scipy", "numba", "heyoka", "sundials")
 
 
 def torque(motor: Component, speeds: Any, time: float = 0.0) -> NDArray[np.float64]:

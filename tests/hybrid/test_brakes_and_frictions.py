@@ -13,7 +13,7 @@ from scipy.integrate import quad
 
 import shaftwork as sw
 
-ENGINES = ("heyoka", "scipy", "sundials")
+ENGINES = ("heyoka", "numba", "scipy", "sundials")
 # Every motion here is a polynomial of time or nearly one, and events are located far below the tolerance of the run.
 EXACT = 1e-9
 

@@ -12,7 +12,7 @@ import pytest
 
 import shaftwork as sw
 
-ENGINES = ("heyoka", "scipy", "sundials")
+ENGINES = ("heyoka", "numba", "scipy", "sundials")
 # Between impacts every motion is a polynomial of time, and events are located far below the tolerance of the run.
 EXACT = 1e-9
 

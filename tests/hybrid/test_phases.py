@@ -260,7 +260,9 @@ def test_a_phase_that_does_not_exist_is_refused_with_those_that_do() -> None:
 
 @pytest.mark.parametrize("engine", ["exact", "banded"])
 def test_an_engine_that_follows_no_modes_is_refused_with_those_that_do(engine: str) -> None:
-    with pytest.raises(sw.ParameterError, match=rf"'{engine}' follows no parts that change their mode.*heyoka, scipy"):
+    with pytest.raises(
+        sw.ParameterError, match=rf"'{engine}' follows no parts that change their mode.*heyoka, numba, scipy"
+    ):
         model().simulate(1.0, engine=engine)
 
 

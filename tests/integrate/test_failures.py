@@ -107,7 +107,7 @@ def test_heyoka_asks_for_a_program(oscillator):
 
 
 def test_an_unknown_engine_is_answered_with_the_list(oscillator):
-    with pytest.raises(ParameterError, match=r"no engine 'matlab'.*auto, exact, heyoka, sundials, .*scipy"):
+    with pytest.raises(ParameterError, match=r"no engine 'matlab'.*auto, exact, heyoka, numba, sundials, .*scipy"):
         choice.solve(oscillator.problem, "matlab")
 
 

@@ -25,7 +25,7 @@ from tests.properties.examples import share_of_examples
 pytestmark = pytest.mark.filterwarnings("ignore:jumping source:shaftwork.core.errors.NetworkWarning")
 
 Array = NDArray[np.float64]
-ENGINES = ("auto", "scipy", "scipy-radau", "sundials", "heyoka")
+ENGINES = ("auto", "scipy", "scipy-radau", "sundials", "heyoka", "numba")
 CARRIER, RING = 3 / 17, -4 / 17
 """Speeds of the gear's inertias over that of its sun: sun + 2 ring = 3 carrier, 1 ring / 2 = -2 carrier / 3."""
 

@@ -15,7 +15,7 @@ from shaftwork.integrate.engines import available
 from shaftwork.integrate.problem import Problem
 from shaftwork.integrate.smooth_intervals import pieces
 
-ENGINES = ["heyoka", "scipy", "scipy-radau", "sundials", "banded"]
+ENGINES = ["heyoka", "numba", "scipy", "scipy-radau", "sundials", "banded"]
 RTOLS = [1e-4, 1e-6, 1e-9]
 # Of the largest speed, in tolerances. The errors of CVODE's formulas, of order 5 at most, add up over thousands of
 # steps, in smooth motions as well (a factor 1000 in `test_engines_agree`): 830 was met here, and 43 of other engines.

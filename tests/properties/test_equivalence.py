@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, ClassVar
 
+import numba
 import numpy as np
 import pytest
 import sympy
@@ -70,6 +71,22 @@ def test_symbolic_rows_equal_the_array_program(net: sw.Network, seed: int) -> No
     terms = np.abs(model.jacobian(time, x).toarray()) @ np.abs(x) + np.abs(bound.rhs(time, np.zeros(len(x))))
     error = np.abs(model.rhs(time, x) - bound.rhs(time, x))
     assert (error <= 1e-9 * (terms + 1e-12 * terms.max(initial=0.0))).all()
+
+
+@pytest.mark.slow
+@share_of_examples(0.1)
+@given(nonlinear_networks(), SEEDS)
+def test_machine_code_equals_the_right_hand_side(net: sw.Network, seed: int) -> None:
+    """Tolerance 1e-13 of the largest term: the same operations, in another order."""
+    model = compiled(net)
+    (time, x), program = _random_state(model, seed), model.machine_program
+    if program is None:
+        return
+    call = numba.njit(lambda rates, t, x, p, dx: rates(t, x, p, dx))
+    rates, right = np.empty_like(x), model.rhs(time, x)
+    call(program.rates, time, x, program.values(model.defaults), rates)
+    terms = np.abs(model.jacobian(time, x).toarray()) @ np.abs(x) + np.abs(model.rhs(time, 0 * x))
+    assert (np.abs(rates - right) <= 1e-13 * (terms + np.abs(right) + 1e-12 * terms.max(initial=0.0))).all()
 
 
 @share_of_examples(0.2)

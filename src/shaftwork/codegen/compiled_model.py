@@ -330,6 +330,15 @@ class CompiledModel:
             return None
 
     @cached_property
+    def machine_program(self) -> Any:
+        """The right-hand side in machine code for engines, or None where there is none."""
+        try:
+            rows = None if self.form.waves else self.rows or explicit_rows(self.form)
+        except BlockTooLargeError:
+            return None
+        return machine_program(rows, self.form.graph.name)
+
+    @cached_property
     def linear(self) -> bool:
         """Whether the right-hand side is linear in the states with constant coefficients."""
         return self.arrays.inputs.linear
@@ -342,6 +351,18 @@ class CompiledModel:
         part = self.bind().part
         products = int(part.A.nnz + part.B.nnz + part.C.nnz + part.D.nnz + part.B1.nnz)
         return Cost("array", {"mul": products, "add": products, "law": self.arrays.inputs.size}, entries)
+
+
+def machine_program(rows: Rows | None, title: str) -> Any:
+    """The `machine_program.MachineProgram` of rows; None without rows or numba, or where a law has no such code."""
+    if rows is None or not rows.states or find_spec("numba") is None:
+        return None
+    from shaftwork.codegen.machine_program import MachineProgram
+
+    try:
+        return MachineProgram(rows, title)
+    except CompileError:
+        return None
 
 
 def _sets_of_equations(graph: CircuitGraph) -> int:

@@ -254,7 +254,7 @@ class LoopedSource:
         self._rows, self._title = rows, title
 
     @cached_property
-    def _stencils(self) -> tuple[tuple[Stencil, ...], dict[Symbol, Basic]]:
+    def stencils(self) -> tuple[tuple[Stencil, ...], dict[Symbol, Basic]]:
         """The stencils in terms of what parameters alone tell, and that by symbols."""
         stencils, symbols = stencils_of(self._rows), dict[Basic, Symbol]()
         free = dict.fromkeys(symbol for stencil in stencils for symbol in stencil.rate.free_symbols)
@@ -281,7 +281,7 @@ class LoopedSource:
         """
         if not isinstance(language, str) or language not in _LANGUAGES:
             raise ParameterError(f"There is no source in {language!r}. Take one of: {', '.join(map(repr, LANGUAGES))}.")
-        form, (stencils, constants) = _LANGUAGES[language], self._stencils
+        form, (stencils, constants) = _LANGUAGES[language], self.stencils
         names: dict[Basic, str] = {TIME: "t"}
         names |= {symbol: f"p[{k}]" for k, symbol in enumerate(self._rows.parameters)}
         names |= {symbol: str(symbol.name) for symbol in constants}
@@ -293,11 +293,11 @@ class LoopedSource:
             for symbol, value in constants.items()
         ]
         for stencil in stencils:
-            read = {symbol: form.state(stencil, distance) for symbol, distance in _read(stencil.rate)}
+            read = {symbol: form.state(stencil, distance) for symbol, distance in read_by(stencil.rate)}
             rate = self._printed(form.printer({**names, **read}), stencil.rate)
             written = (form.single,) if stencil.count == 1 else form.loop
             begins = (
-                [stencil.first + distance for _, distance in _read(stencil.rate)]
+                [stencil.first + distance for _, distance in read_by(stencil.rate)]
                 if form.view and stencil.count > 1
                 else []
             )
@@ -316,7 +316,7 @@ class LoopedSource:
         return str(printer.doprint(expression))
 
 
-def _read(rate: Expr) -> list[tuple[Symbol, int]]:
+def read_by(rate: Expr) -> list[tuple[Symbol, int]]:
     """The states that a rate reads, and their distances."""
     states = (symbol for symbol in rate.free_symbols if symbol.name.startswith("x[i"))
     return sorted(((symbol, int(symbol.name[3:-1])) for symbol in states), key=lambda pair: pair[1])

@@ -32,12 +32,17 @@ def choose(problem: Problem) -> tuple[str, str]:
         if asked and entry.installed and (why := entry.function("suits")(problem)):
             return name, why
     compiled = available("heyoka") and problem.program is not None
-    stiff = _stiff(problem, "heyoka" if compiled else "scipy")
+    with_numba = not compiled and available("numba") and problem.compiled is not None
+    stiff = _stiff(problem, "heyoka" if compiled else "numba" if with_numba else "scipy")
     if stiff is not None:
         return stiff
     if compiled:
         return "heyoka", "The system is not stiff and its equations are compiled, so Taylor series are the fastest."
     reason = "heyoka cannot compile its equations" if available("heyoka") else "heyoka is not installed"
+    if with_numba and problem.machine is not None:
+        return "numba", f"The system is not stiff and {reason}, so DOP853 is taken, compiled by numba."
+    if with_numba and (stiff := _stiff(problem, "scipy")) is not None:
+        return stiff
     return "scipy", f"The system is not stiff and {reason}, so scipy's DOP853 is taken."
 
 

@@ -11,7 +11,7 @@ from typing import Any, Literal, get_args
 
 from shaftwork.numerics.tolerances import EPS
 
-EngineName = Literal["auto", "exact", "heyoka", "sundials", "scipy", "scipy-radau", "banded", "wave"]
+EngineName = Literal["auto", "exact", "heyoka", "numba", "sundials", "scipy", "scipy-radau", "banded", "wave"]
 ENGINE_NAMES: tuple[EngineName, ...] = get_args(EngineName)
 """What a run may be asked for: `auto` for the engine that suits, or the name of one in `ENGINES`."""
 
@@ -123,6 +123,18 @@ ENGINES: dict[str, EngineEntry] = {
         loosest=1e-10,  # the cost grows only with the logarithm, and a loose one loses events
         absolute="overall",
         following=(1.0, 1e-12),
+    ),
+    "numba": EngineEntry(
+        module="explicit.dormand_prince",
+        method="DOP853, compiled by numba",
+        suited="everything that is not stiff, where there is no heyoka",
+        library="numba",
+        distribution="numba",
+        extra="fast",
+        step=(2e-5, 5e-8),
+        explicit=True,
+        finest=100 * EPS,
+        following=(1 / 30, 1e-7),
     ),
     "sundials": _SUNDIALS,
     "sundials-adams": replace(

@@ -80,6 +80,18 @@ class LinearInputs:
         return value
 
 
+class MachineRates(NamedTuple):
+    """A right-hand side in machine code, with its parameters.
+
+    Args:
+        rates: compiled by numba: (t, x (n,), p (parameters,), dx (n,)) writes dx.
+        p: (parameters,) their values.
+    """
+
+    rates: Any
+    p: Array
+
+
 @dataclass(frozen=True)
 class Guards:
     """What ends a phase of a motion.
@@ -230,6 +242,7 @@ class Problem(TimedProblem):
         observed: all quantities of a linear network, or None.
         symbolic: the same system as a heyoka program with its parameters (`codegen.taylor.heyoka.BoundProgram`), a
             function that makes this where an engine asks for it, or None where there is none.
+        compiled: makes the same right-hand side in machine code, or None where there is none; or None.
         rough: from times (k,) and states (k, n) to the first time at which any part of a law has no value or no slope,
             be it in a branch that does not hold, and that law in words.
         overall: the size of the largest state where it stays below one: so much smaller is a tolerance for all states.
@@ -244,6 +257,7 @@ class Problem(TimedProblem):
     linear: LinearInputs | None = None
     observed: Observed | None = None
     symbolic: Any = None
+    compiled: Callable[[], MachineRates | None] | None = None
     rough: Callable[[Array, Array], tuple[float, str] | None] | None = None
     overall: float = 1.0
     estimates: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
@@ -258,6 +272,11 @@ class Problem(TimedProblem):
     def program(self) -> Any:
         """The heyoka program of `symbolic`, or None: runs of other engines do not even load heyoka."""
         return self.symbolic() if callable(self.symbolic) else self.symbolic
+
+    @cached_property
+    def machine(self) -> MachineRates | None:
+        """What `compiled` makes, or None."""
+        return None if self.compiled is None else self.compiled()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,34 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 from scipy.integrate import DOP853, Radau
 
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.crossings import Dense
-from shaftwork.integrate.engines import ENGINES
-from shaftwork.integrate.guards import BRIEF
-from shaftwork.integrate.linear.rounding_errors import cancellation
-from shaftwork.integrate.problem import Array, Problem, Trajectory, tightened
-from shaftwork.integrate.smooth_intervals import GuardedFunctions, SmoothInterval, failure
-from shaftwork.integrate.stepping import Step, SteppedRun, march, trajectory
-from shaftwork.integrate.stiffness import STABLE, bound_of_decay, jacobians, rates
+from shaftwork.integrate.explicit.explicit_runs import MarchedRun, solid
+from shaftwork.integrate.problem import Array, Problem, Trajectory
+from shaftwork.integrate.smooth_intervals import GuardedFunctions, PiecewiseDense, SmoothInterval, failure
+from shaftwork.integrate.stepping import Step, march, with_outputs
 
 Method = Literal["DOP853", "Radau"]
 
 METHODS: dict[str, Any] = {"DOP853": DOP853, "Radau": Radau}
 
-# A run is made again where the torques of dampers may be off by more than this factor times the tolerance.
-BEARABLE = 2.0
-
 
 def solve(problem: Problem, method: Method = "DOP853") -> Trajectory:
     """Integrate with one of scipy's methods.
 
-    An explicit run in which dampers carry small differences of large parts is made again, with a tolerance that is
-    smaller by what cancels (`cancellation`): its steps are bound by stability and hardly become shorter.
+    An explicit run in which dampers carry small differences of large parts is made again, see `solid`.
 
     Args:
         problem: what to solve.
@@ -42,60 +35,19 @@ def solve(problem: Problem, method: Method = "DOP853") -> Trajectory:
 
     Source: scipy.integrate; Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I (DOP853) and II (Radau).
     """
-    run = _run(problem, method)
-    if method == "DOP853" and (problem.guards is None or _on_edge(problem, run.march.steps)):
-        # On the edge of its stability it leaves errors of the tolerance in what an implicit method damps.
-        times, states = _starts(run.march)
-        few = slice(None) if problem.guards is None else [0, -1]  # of many short runs, each tells a little
-        factor = cancellation(problem, times[few], states[few])
-        if BEARABLE < factor < 1 / np.finfo(float).eps:  # it is beyond all bounds where nothing has moved yet
-            # On the edge of stability errors are some 50 times as large as the tolerance that is asked for.
-            share = max(1 / (50 * factor), ENGINES["scipy"].finest / problem.rtol)
-            decay = rates(jacobians(problem)).decay
-            # A longer step than is stable may well end right, because what is left of the fast motion is tiny at its
-            # start, and yet be off inside by much more than the torque of a damper bears.
-            again = _run(tightened(problem, share), method, longest=STABLE / decay if decay > 0 else np.inf)
-            run = _Run(again.march, again.parts, {name: run.counts[name] + again.counts[name] for name in run.counts})
-    return trajectory(problem, run.march, run.parts, run.counts)
+    if method == "DOP853":
+        whole = solid(problem, lambda problem, longest: _run(problem, method, longest))
+    else:
+        whole = _run(problem, method)
+    return with_outputs(problem, whole.march, whole.dense, whole.counts)
 
 
-class _Run(NamedTuple):
-    """All steps, dense output of each, and counts by name."""
-
-    march: SteppedRun
-    parts: list[Dense]
-    counts: dict[str, int]
-
-
-def _run(problem: Problem, method: Method, longest: float = np.inf) -> _Run:
+def _run(problem: Problem, method: Method, longest: float = np.inf) -> MarchedRun:
     """A run in steps of at most `longest` s."""
     stepper = _ScipyStepper(problem, method, longest)
     whole = march(problem, stepper)
-    counts = {"steps": whole.steps.size - 1, **dict(zip(("rhs", "jacobians"), stepper.calls, strict=True))}
-    return _Run(whole, stepper.parts, counts)
-
-
-def _on_edge(problem: Problem, steps: Array) -> bool:
-    """Whether one of the steps, by their ends (s,), is so long that it may be stability which bounds it.
-
-    With a product of length and decay rate below 1 it is far from that, and every fast motion has steps of its own. The
-    decay is looked at once for many brief phases in the same modes, and anew for a long one.
-    """
-    longest, estimates = float(np.diff(steps).max()), problem.estimates
-    long = steps.size - 1 > BRIEF
-    if long or "decay" not in estimates:
-        if long or "bound" not in estimates:
-            estimates["bound"] = bound_of_decay(jacobians(problem))
-        if longest * estimates["bound"] <= 1:
-            return False
-        estimates["decay"] = rates(jacobians(problem)).decay
-    return bool(longest * estimates["decay"] > 1)
-
-
-def _starts(whole: SteppedRun) -> tuple[Array, Array]:
-    """Times and states at the starts of all steps: there no input is in the midst of a jump."""
-    times = [time for piece in whole.pieces for time in piece.times[:-1]]
-    return np.array(times), np.array([state for piece in whole.pieces for state in piece.states[:-1]])
+    dense = PiecewiseDense(whole.steps[:-1], tuple(stepper.parts), whole.steps, problem.x0.size)
+    return MarchedRun(whole, dense, dict(zip(("rhs", "jacobians"), stepper.calls, strict=True)))
 
 
 class _ScipyStepper:

@@ -10,7 +10,7 @@ import numpy as np
 
 from shaftwork.integrate.crossings import Crossings, Dense
 from shaftwork.integrate.guards import GuardWatch
-from shaftwork.integrate.problem import Array, DaeProblem, Problem, TimedProblem, Trajectory
+from shaftwork.integrate.problem import Array, DaeProblem, DenseOutput, Problem, TimedProblem, Trajectory
 from shaftwork.integrate.smooth_intervals import (
     PiecewiseDense,
     SmoothInterval,
@@ -30,11 +30,15 @@ class Step(NamedTuple):
         end: s.
         state: (n,) there.
         dense: times (k,) inside the step to states (k, n), until the next step is made.
+        before: steps that were made first, in which nothing is met: their ends (k,) in s and the states (k, n) there.
+        clear: whether nothing is met in this one either.
     """
 
     end: float
     state: Array
     dense: Dense
+    before: tuple[Array, Array] | None = None
+    clear: bool = False
 
 
 class Stepper(Protocol):
@@ -104,6 +108,12 @@ class SteppedPiece:
     times: list[float]
     states: list[Array]
 
+    def extended(self, ends: Array, states: Array) -> tuple[float, Array]:
+        """Add steps by their ends (k,) in s and the states (k, n) there; the last of these."""
+        self.times.extend(ends.tolist())
+        self.states.extend(states)
+        return self.times[-1], self.states[-1]
+
 
 class SteppedRun(NamedTuple):
     """All steps of a run.
@@ -160,8 +170,13 @@ def march(problem: Problem | DaeProblem, stepper: Stepper) -> SteppedRun:
             step = stepper.step(t, x)
             if step is None:
                 continue
-            guard = watch.cut(t, x, step.end, step.state, step.dense)
-            switch = crossings.cut(t, x, step.end, step.state, step.dense, again=not stepper.cuts_off)
+            if step.before is not None:
+                left -= step.before[0].size
+                t, x = done[-1].extended(*step.before)
+                pace.passed(step.before[0].size)
+            looks = t, x, step.end, step.state, step.dense
+            guard = None if step.clear else watch.cut(*looks)
+            switch = None if step.clear else crossings.cut(*looks, again=not stepper.cuts_off)
             if guard is not None and (switch is None or guard <= switch):
                 if step.end - t > shortest and not watch.follows(t, x, guard, step.dense):
                     stepper.again(t, x, piece.end, (step.end - t) / 8)
@@ -197,14 +212,20 @@ def trajectory(
         parts: dense output of each step that was taken, in order.
         statistics: counts by name beside that of the steps.
     """
-    steps = run.steps
-    dense = PiecewiseDense(steps[:-1], tuple(parts), steps, problem.x0.size)
+    dense = PiecewiseDense(run.steps[:-1], tuple(parts), run.steps, problem.x0.size)
+    return with_outputs(problem, run, dense, statistics)
+
+
+def with_outputs(
+    problem: Problem, run: SteppedRun, dense: DenseOutput, statistics: Mapping[str, int] | None = None
+) -> Trajectory:
+    """The same where dense output of the whole run is one; arguments as for `trajectory`."""
     if problem.t_eval is None:
         t, x = run.both_sides(problem)
     else:
         t = reached(problem.t_eval, run.end[0])
         x = dense(t)
-    counts = {"steps": steps.size - 1, **(statistics or {})}
+    counts = {"steps": dense.steps.size - 1, **(statistics or {})}
     return Trajectory(t, x, dense, counts, met=run.met, end=run.end)
 
 
@@ -222,6 +243,10 @@ class Pace:
         self._progress, self._duration = problem.progress, problem.t_end - problem.t0
         self._since, self._steps = problem.t0, 0
 
+    def passed(self, steps: int) -> None:
+        """Count steps that were made before one that is looked at."""
+        self._steps += steps
+
     def objection(self, t: float, *, rests: bool = False) -> str | None:
         """After each step to a time t in s: the reason to give up, or None.
 
@@ -232,9 +257,10 @@ class Pace:
         if self._progress is not None:
             self._progress(t)
         self._steps += 1
-        if self._steps % self._every:
+        if self._steps < self._every:
             return None
-        advance, self._since = t - self._since, t
+        advance, self._since = (t - self._since) * self._every / self._steps, t
+        self._steps = 0
         # Where it rests, ten million such steps would make a run. Where a law is as the square root of the speed, such
         # a run would not end otherwise.
         if advance >= self._every * (1e-7 if rests else self._least) * self._duration:

@@ -22,7 +22,7 @@ from shaftwork.core.errors import AccuracyWarning
 from shaftwork.core.notices import warn
 from shaftwork.formulation.form import StateForm
 from shaftwork.integrate.engines import ENGINES, too_fine
-from shaftwork.integrate.problem import Fractions, LinearInputs, Observed, Problem
+from shaftwork.integrate.problem import Fractions, LinearInputs, MachineRates, Observed, Problem
 from shaftwork.network.graph import GROUND
 from shaftwork.network.kinds import Kind
 from shaftwork.pipeline.arguments import NOMINAL, Demand, Sizes
@@ -75,6 +75,11 @@ class Prepared:
     def symbolic(self) -> Any:
         """The heyoka program with the parameters, or None where there is none."""
         return self._taylor
+
+    def compiled(self) -> MachineRates | None:
+        """The right-hand side in machine code, or None where there is none."""
+        program = self.model.machine_program
+        return None if program is None else MachineRates(program.rates, program.values(self.p))
 
     @cached_property
     def atol(self) -> Array:
@@ -145,6 +150,7 @@ class Prepared:
             linear=self.linear,
             observed=observed(self) if model.linear else None,
             symbolic=self.symbolic,
+            compiled=self.compiled,
             explain=lambda t, x: without_value(self.bound, t, x),
             rough=lambda t, x: rough(self.bound, t, x),
             max_steps=demand.max_steps,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache, cached_property, partial
 from itertools import count
 from operator import methodcaller
@@ -18,7 +19,7 @@ from shaftwork.codegen.array_form.linear_readings import ReadingMatrices
 from shaftwork.codegen.array_form.matrices import LinearPart
 from shaftwork.codegen.array_form.recovery import BranchHistory
 from shaftwork.codegen.code import Moves, around, bindable, is_rough, vectorised, vectorised_list
-from shaftwork.codegen.compiled_model import ScalarProgram
+from shaftwork.codegen.compiled_model import ScalarProgram, machine_program
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.codegen.undefined_laws import first_missing, in_words, rough, without_value
 from shaftwork.components.discontinuities import pieces_degree
@@ -32,7 +33,7 @@ from shaftwork.formulation.observables import NamedReadings, Observables
 from shaftwork.hybrid.modes.mode_machines import ModeGuards, ModeMachine, ModeNames
 from shaftwork.hybrid.modes.starts import MachineReadings
 from shaftwork.integrate.engines import available
-from shaftwork.integrate.problem import Guards, Problem
+from shaftwork.integrate.problem import Guards, MachineRates, Problem
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.prepared import Prepared
 
@@ -221,6 +222,7 @@ class ModeEquations:
             guards=Guards(values, self.sides(modes), none, none),
             switches=(lambda t, y: bound().switches(t, y[:, :size])) if self.model.arrays.inputs.switching else None,
             symbolic=cache(lambda: None if self.program is None else self.program.bind(self.values(p))),
+            compiled=cache(lambda: self._machine(p)),
             explain=lambda t, y: self.without_value(p, modes, t, y[:, :size]),
             rough=lambda t, y: self._rough(p, modes, t, y[:, :size]),
             estimates=notes,
@@ -371,10 +373,27 @@ class ModeEquations:
             return None
         from shaftwork.codegen.taylor.heyoka import build
 
-        states = (*rows.states, *(Symbol(f"clock {k}", real=True) for k in self.clocks))
-        rates = (*rows.rates, *(CLOCK * self.expressions[k] for k in self.clocks))
+        states, rates = self._with_clocks(rows)
         changing = [*(rows.parameters[place] for place in self._numbers), *rows.parameters[len(self._places) :]]
         try:
             return build(states, TIME, rows.parameters, rates, tuple(self.expressions), changing)
         except CompileError:
             return None
+
+    def _with_clocks(self, rows: Rows) -> tuple[tuple[Symbol, ...], tuple[Expr, ...]]:
+        """The states and, behind them, the clocks, and the rates of all."""
+        states = (*rows.states, *(Symbol(f"clock {k}", real=True) for k in self.clocks))
+        return states, (*rows.rates, *(CLOCK * self.expressions[k] for k in self.clocks))
+
+    def _machine(self, p: Array) -> MachineRates | None:
+        """The right-hand side in machine code with its parameters, or None where there is none."""
+        program = self.whole.machine_program
+        return None if program is None else MachineRates(program.rates, program.values(np.array(self.values(p))))
+
+    @cached_property
+    def machine_program(self) -> Any:
+        """The right-hand side in machine code, made where it is kept; None where there is none."""
+        if (rows := self._rows) is None:
+            return None
+        states, rates = self._with_clocks(rows)
+        return machine_program(replace(rows, states=states, rates=rates), self.model.name)

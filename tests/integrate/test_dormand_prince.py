@@ -1,0 +1,101 @@
+"""The engine that numba compiles makes the steps of scipy's DOP853, and ends at the same events."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sympy
+from hypothesis import given
+
+import shaftwork as sw
+from tests.properties.examples import network_of, share_of_examples
+from tests.strategies import Network, networks
+
+SCENES = {"crane_start": 10.0, "crane": 10.0, "excavator": 3.0, "shaft_step": 0.02}
+
+
+def largest_difference(one: sw.Solution, other: sw.Solution) -> float:
+    """Over the largest value of each state."""
+    differences = np.abs(one.x - other.x).max(axis=0)
+    return float((differences / np.maximum(np.abs(other.x).max(axis=0), 1e-9)).max(initial=0.0))
+
+
+@share_of_examples(0.2)
+@given(networks(max_inertias=6))
+def test_random_networks_move_as_with_scipy(pieces: Network) -> None:
+    model = network_of(pieces).compile()
+    try:
+        one, other = (model.simulate(0.2, t_eval=11, rtol=1e-9, engine=engine) for engine in ("numba", "scipy"))
+    except sw.ParameterError:  # too closely coupled for rows
+        assert model.machine_program is None
+        return
+    # The steps are the same but for rounding: what differs is far below the tolerance, in which both are off.
+    assert np.abs(one.x - other.x).max(initial=0.0) <= 1e-8 * np.abs(other.x).max(initial=1.0)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_scenes_move_as_with_scipy_through_all_their_events(scene: str) -> None:
+    model = getattr(sw.scenes, scene)().compile()
+    runs = [model.simulate(SCENES[scene], t_eval=51, rtol=1e-9, engine=engine) for engine in ("numba", "scipy")]
+    # 1e-6: two runs at 1e-9, each off by some hundred tolerances after dozens of events
+    assert largest_difference(*runs) < 1e-6
+    assert [event[1:] for event in runs[0].events] == [event[1:] for event in runs[1].events]
+    steps = [run.statistics["steps"] for run in runs]
+    # a step that is looked at closely may end a hair apart, and so may be one more
+    assert abs(steps[0] - steps[1]) <= 2 + 0.1 * steps[1]
+
+
+def test_tables_and_noise_have_machine_code() -> None:
+    net = sw.Network("mill")
+    net.add(sw.Inertia("J", J=2.0), "rotor")
+    table = sw.Table([-5.0, 0.0, 4.0, 20.0], [0.0, -1.0, 3.0, 9.0])
+    law = table(sw.omega) + 0.3 * sw.HeldNoise(sw.t / 0.05, 3)
+    net.add(sw.TorqueSource("mill", tau=-law), "rotor")
+    net.add(sw.TorqueSource("motor", tau=5.0), "rotor")
+    one, other = (net.simulate(4.0, rtol=1e-10, engine=engine) for engine in ("numba", "scipy"))
+    assert np.abs(one["J.omega"] - other["J.omega"]).max() < 1e-8 * other["J.omega"].max()
+
+
+def test_between_its_steps_the_motion_is_as_exact_as_at_their_ends() -> None:
+    net = sw.Network("oscillator")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.Spring("c", c=400.0), "a", "ground")
+    net.add(sw.TorqueSource("weak", tau=-1e-30 * sw.omega**3), "a")  # no linear engine
+    run = net.simulate(3.0, t_eval="steps", rtol=1e-9, engine="numba", initial={"J.omega": 1.0})
+    times = np.linspace(0.0, 3.0, 5001)
+    inside = run.dense(times)[:, 0]
+    # dense output is of order 7, and the errors of some hundred steps add up
+    assert np.abs(inside - np.cos(20 * times)).max() < 1e-6
+
+
+def test_a_law_without_a_value_is_named_with_its_time() -> None:
+    net = sw.Network("run down")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.TorqueSource("pull", tau=sympy.sqrt(1 - sw.t)), "a")
+    net.add(sw.TorqueSource("drag", tau=-0.1 * sw.omega**3), "a")
+    with pytest.raises(sw.SimulationError, match=r"At t = 1(\.0+\d*)? s .*pull.* has no real value"):
+        net.simulate(2.0, engine="numba")
+
+
+def test_its_steps_are_limited() -> None:
+    with pytest.raises(sw.SimulationError, match="20 steps were not enough"):
+        sw.scenes.crane_start().simulate(10.0, engine="numba", max_steps=20)
+
+
+def test_waves_and_smooth_noise_are_refused_with_the_next_step() -> None:
+    net = sw.Network("rough")
+    net.add(sw.Inertia("J", J=2.0), "rotor")
+    net.add(sw.TorqueSource("mill", tau=-(sw.omega**3) + sw.SmoothNoise(sw.t / 0.05, 3)), "rotor")
+    with pytest.raises(sw.ParameterError, match=r"engine 'numba' needs.*engine='auto'"):
+        net.simulate(1.0, engine="numba")
+
+
+def test_without_heyoka_auto_takes_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    find = __import__("importlib.util").util.find_spec
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "heyoka" else find(name))
+    monkeypatch.setattr(
+        "shaftwork.codegen.compiled_model.find_spec", lambda name: None if name == "heyoka" else find(name)
+    )
+    run = sw.scenes.crane().simulate(10.0)
+    assert run.engine == "numba"
+    assert "heyoka is not installed" in run.why
