@@ -105,8 +105,7 @@ class Netlist:
         outside |= dict(zip(self.ports, nodes, strict=True))
 
         def moved(item: Placed) -> Placed:
-            part = item.part.changed(name=f"{name}.{item.part.name}")
-            return replace(item, part=part, nodes=tuple(outside[node] for node in item.nodes))
+            return replace(item, part=item.part.within(name), nodes=tuple(outside[node] for node in item.nodes))
 
         return tuple(map(moved, self.placed))
 

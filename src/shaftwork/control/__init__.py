@@ -1,0 +1,1 @@
+"""Linear models for other tools: python-control, scipy and CSV."""

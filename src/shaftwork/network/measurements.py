@@ -1,0 +1,114 @@
+"""What a part measures of others: which nodes and stores a name stands for, "J2.omega", "shaft.tau_c"."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from difflib import get_close_matches
+from typing import Any
+
+from sympy import Expr, Integer, Symbol
+
+from shaftwork.components.base import Component, Signal
+from shaftwork.components.branches import MEASURED, End, named_in
+from shaftwork.components.laws import replaced
+from shaftwork.core.domains import ROTATION
+from shaftwork.core.errors import ShaftworkError
+from shaftwork.network.kinds import Kind
+from shaftwork.network.netlist import REFERENCE, Netlist, Placed
+from shaftwork.network.templates import BranchTemplate, Template, make_template
+
+AT_NODE, IN_STORE = "node", "store"
+"""What a law of a network reads of other parts: the across variable of a node, the through variable of a store."""
+
+
+class NotMeasurableError(ShaftworkError):
+    """A name stands for nothing that a part can measure of another; says what it can measure instead."""
+
+
+class Measurements:
+    """The quantities of a network that its parts can measure.
+
+    Args:
+        netlist: the network.
+        resolve: values of a part in SI.
+    """
+
+    def __init__(self, netlist: Netlist, resolve: Callable[[Component], Mapping[str, Any]]) -> None:
+        self._placed = {placed.part.name: placed for placed in netlist.placed}
+        self._resolve = resolve
+        self._templates: dict[BranchTemplate, BranchTemplate] = {}
+        self._domains = {
+            node: port.domain or ROTATION
+            for placed in netlist.placed
+            for port, node in zip(placed.part.ports, placed.nodes, strict=False)
+            if node != REFERENCE
+        }
+
+    def placed(self, template: BranchTemplate) -> BranchTemplate:
+        """A branch whose law reads nodes and stores in place of the names of what it measures."""
+        if template not in self._templates:
+            reads = ((symbol, *named_in(symbol)) for symbol in template.reads)
+            laws = {symbol: self.law(name) for symbol, kind, name in reads if kind == MEASURED}
+            law, printed = (replaced(each, laws) for each in (template.law, template.printed))
+            self._templates[template] = replace(template, law=law, printed=printed) if laws else template
+        return self._templates[template]
+
+    def law(self, name: str) -> Expr:
+        """A quantity as a sum of across variables of nodes and of what stores let through.
+
+        Raises:
+            NotMeasurableError: there is no such quantity, or others decide it at the same instant.
+        """
+        owner, _, quantity = name.rpartition(".")
+        if (placed := self._placed.get(owner)) is not None:
+            laws = self._laws_of(placed)
+            if (law := laws.get(quantity)) is not None:
+                return law
+            has = quantity in placed.part.signals()
+            why = "follows from others at the same instant" if has else "does not exist"
+            able = ", ".join(f"{owner}.{each}" for each in laws) or "nothing"
+            raise NotMeasurableError(f"'{name}' {why}. Of '{owner}' it can measure: {able}.")
+        if owner in self._domains and quantity == self._domains[owner].across.name:
+            return Symbol(f"{AT_NODE} of {owner}", real=True)
+        close = get_close_matches(owner, (*self._placed, *self._domains), n=3)
+        near = f"Close to it: {', '.join(close)}. " if close else ""
+        raise NotMeasurableError(f"'{name}': there is no part or node '{owner}'. {near}Name one such as J2.omega.")
+
+    def _laws_of(self, placed: Placed) -> dict[str, Expr]:
+        """What can be measured of a part: what is across it, and what its springs and inductors let through."""
+        part = placed.part
+        template = make_template(part, self._resolve(part))
+        nodes = dict(zip((port.name for port in part.ports), placed.nodes, strict=False))
+
+        def across(end: End) -> Expr:
+            if end is None or nodes.get(end, "") == REFERENCE:
+                return Integer(0)
+            inner = any(port.name == end for port in part.inner_ports())
+            node = f"{part.name}.{end}" if inner else nodes.get(end)
+            return Integer(0) if node is None else Symbol(f"{AT_NODE} of {node}", real=True)
+
+        laws: dict[str, Expr] = {}
+        for name, signal in part.signals().items():
+            if signal.kind == "across":
+                laws[name] = signal.sign * (across(signal.ends[0]) - across(signal.ends[1]))
+            elif (label := _store(template, signal)) is not None:
+                laws[name] = signal.sign * Symbol(f"{IN_STORE} of {part.name}.{label}", real=True)
+        return laws
+
+
+def _store(template: Template, signal: Signal) -> str | None:
+    """The label of the store that a signal is of alone, "" where it has none; None where others have a part in it."""
+    if template.modes or signal.kind == "twist":
+        return None
+    if signal.kind == "store":
+        stores = [branch for branch in template.branches if branch.kind is Kind.THROUGH_STORE]
+        alike = [branch for branch in stores if branch.label == signal.label] or stores
+    else:
+        alike = [
+            branch
+            for branch in template.branches
+            if branch.terms or not {*branch.ends}.isdisjoint({*signal.ends} - {None})
+        ]
+    only = len(alike) == 1 and alike[0].kind is Kind.THROUGH_STORE and alike[0].ends == signal.ends
+    return alike[0].label if only else None
