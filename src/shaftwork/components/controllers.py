@@ -211,12 +211,13 @@ class Controller(Component):
             e = [point - measured_of(name) for point, name in zip(asked, self.measured.names, strict=True)]
             e[0] += p.reference
             for name, row, gains in zip(states, A, B, strict=True):
-                yield ThroughLaw(-_sum(row, x) - _sum(gains, e), (name, None), f"w{name.removeprefix('x')}")
+                yield ThroughLaw(_sum(row, x) + _sum(gains, e), (None, name), name.replace("x", "w"))
             given = [_sum(row, x) + _sum(gains, e) for row, gains in zip(C, D, strict=True)]
-        else:
+        else:  # what is asked is read at the instants: it is no part of a law, but of its values
             given = [across_of(name) for name, _ in held]
         for law, port, kind in zip(given, self.ports, self.acts.names, strict=True):
-            branch, label = ACTS[kind][1], f"given{port.name.removeprefix('a')}"
+            branch = ACTS[kind][1]
+            label = port.name.replace("a", "u") if len(self.ports) > 1 else "u"
             yield branch(-law if branch is ThroughLaw else law, (port.name, None), label)
 
     def sampler(self) -> Sampler | None:
@@ -224,7 +225,7 @@ class Controller(Component):
         period = number_of(self, "sample_time")
         if period is None:
             return None
-        return Sampler(period, *self.matrices(), self.measured.names, self._setpoints(), "reference")
+        return Sampler(period, *self.matrices(), self.measured.names, self._setpoints(), self.reference)
 
     def within(self, network: str) -> Self:
         """Under the name of the network; so is what it measures."""

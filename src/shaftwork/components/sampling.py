@@ -20,7 +20,7 @@ class Sampler:
         A, B, C, D: (n, n), (n, k), (m, n), (m, k) arrays.
         measured: k names of what is read, "J2.omega".
         setpoints: (k,) what is asked of each, beside the law of the first.
-        reference: the parameter whose law is asked of the first besides.
+        reference: the law that is asked of the first besides, a number, table or expression of time.
     """
 
     period: float
@@ -30,4 +30,4 @@ class Sampler:
     D: Matrix
     measured: tuple[str, ...]
     setpoints: Any
-    reference: str
+    reference: Any
