@@ -151,7 +151,7 @@ class Controller(Component):
         domains = [ACTS[kind][0] for kind in self.acts.names]
         places = [f"_{k}" for k in range(1, len(domains) + 1)] if len(domains) > 1 else [""]
         ports = tuple(Port(f"a{place}", domain) for place, domain in zip(places, domains, strict=True))
-        shown = {"ports": ports, "inner": tuple(Port(name, SIGNAL) for name in inner)}
+        shown: dict[str, Any] = {"ports": ports, "inner": tuple(Port(name, SIGNAL) for name in inner)}
         shown |= {"signal_ports": frozenset(inner), "measures": self.measured.names}
         for name, value in shown.items():  # of this part, in place of those of its class
             object.__setattr__(self, name, value)

@@ -23,7 +23,7 @@ from shaftwork.core.errors import Diagnostic, ShaftworkError
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart, resolve, signals_of
 from shaftwork.network.kinds import Kind
 from shaftwork.network.law_faults import Fault, instead_of, law_faults
-from shaftwork.network.measurements import Measurements, NotMeasurableError
+from shaftwork.network.measurements import unmeasurable
 from shaftwork.network.netlist import (
     MAXIMUM_NAME,
     REFERENCE,
@@ -96,23 +96,9 @@ class _Examination:
 
     def leave_out_blind(self) -> None:
         """Leave out the parts that measure what none of the others has."""
-        measuring = [placed for placed in self.usable if placed.part.measures]
-        measurements = (
-            Measurements(Netlist("", tuple(self.usable)), lambda part: resolve(part)[0]) if measuring else None
-        )
-        for placed in measuring:
-            try:
-                for name in placed.part.measures:
-                    measurements.law(name)
-            except NotMeasurableError as error:
-                self.report(
-                    "measurement",
-                    f"{title(placed.part)} cannot measure {error}",
-                    "Correct measured.",
-                    placed,
-                    "measured",
-                )
-                self.usable.remove(placed)
+        for placed, fault in unmeasurable(Netlist("", tuple(self.usable)), resolve):
+            self.report("measurement", f"{title(placed.part)}: {fault}", "Correct measured.", placed, "measured")
+            self.usable.remove(placed)
 
     def _with_name(self, placed: Placed) -> Component:
         """The part under a name that no other part has."""

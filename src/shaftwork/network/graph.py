@@ -257,8 +257,8 @@ def build_graph(netlist: Netlist) -> CircuitGraph:
         parts.append(GraphPart(part, nodes, places, numbers, template.derived, template.modes, consulted))
     names = tuple(table.numbers)[1:]
     if any(part.component.measures for part in parts):
-        placed = Measurements(netlist, lambda part: resolve(part)[0]).placed
-        branches = [replace(branch, template=placed(branch.template)) for branch in branches]
+        measured = Measurements(netlist, resolve).placed
+        branches = [replace(branch, template=measured(branch.template)) for branch in branches]
     return CircuitGraph(
         netlist.name, names, tuple(table.domains), tuple(parts), tuple(branches), parameters, tuple(zeros)
     )

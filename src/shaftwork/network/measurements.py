@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from difflib import get_close_matches
 from typing import Any
@@ -13,13 +13,16 @@ from shaftwork.components.base import Component, Signal
 from shaftwork.components.branches import MEASURED, End, named_in
 from shaftwork.components.laws import replaced
 from shaftwork.core.domains import ROTATION
-from shaftwork.core.errors import ShaftworkError
+from shaftwork.core.errors import Diagnostic, NetworkError, ShaftworkError
 from shaftwork.network.kinds import Kind
-from shaftwork.network.netlist import REFERENCE, Netlist, Placed
+from shaftwork.network.netlist import REFERENCE, Netlist, Placed, listed
 from shaftwork.network.templates import BranchTemplate, Template, make_template
 
 AT_NODE, IN_STORE = "node", "store"
 """What a law of a network reads of other parts: the across variable of a node, the through variable of a store."""
+
+
+Resolve = Callable[[Component], tuple[Mapping[str, Any], Any]]
 
 
 class NotMeasurableError(ShaftworkError):
@@ -31,10 +34,10 @@ class Measurements:
 
     Args:
         netlist: the network.
-        resolve: values of a part in SI.
+        resolve: values of a part in SI, and what is wrong with them.
     """
 
-    def __init__(self, netlist: Netlist, resolve: Callable[[Component], Mapping[str, Any]]) -> None:
+    def __init__(self, netlist: Netlist, resolve: Resolve) -> None:
         self._placed = {placed.part.name: placed for placed in netlist.placed}
         self._resolve = resolve
         self._templates: dict[BranchTemplate, BranchTemplate] = {}
@@ -78,7 +81,7 @@ class Measurements:
     def _laws_of(self, placed: Placed) -> dict[str, Expr]:
         """What can be measured of a part: what is across it, and what its springs and inductors let through."""
         part = placed.part
-        template = make_template(part, self._resolve(part))
+        template = make_template(part, self._resolve(part)[0])
         nodes = dict(zip((port.name for port in part.ports), placed.nodes, strict=False))
 
         def across(end: End) -> Expr:
@@ -95,6 +98,45 @@ class Measurements:
             elif (label := _store(template, signal)) is not None:
                 laws[name] = signal.sign * Symbol(f"{IN_STORE} of {part.name}.{label}", real=True)
         return laws
+
+
+def unmeasurable(netlist: Netlist, resolve: Resolve) -> Iterator[tuple[Placed, str]]:
+    """The parts that measure what cannot be measured, each with what is wrong; arguments as of `Measurements`."""
+    if not any(placed.part.measures for placed in netlist.placed):
+        return
+    measurements = Measurements(netlist, resolve)
+    for placed in netlist.placed:
+        try:
+            for name in placed.part.measures:
+                measurements.law(name)
+        except NotMeasurableError as error:
+            yield placed, str(error)
+
+
+def refuse_measuring(netlist: Netlist, title: str) -> None:
+    """Refuse a network that is to become another one, in which what parts measure has other names and values.
+
+    Args:
+        netlist: of the network.
+        title: of the error, "'crane' has no circuit".
+
+    Raises:
+        NetworkError: a part measures quantities of others; lists all such parts.
+    """
+    problems = tuple(
+        Diagnostic(
+            "measurement",
+            f"{type(placed.part).__name__} '{placed.part.name}' measures {listed(placed.part.measures)} by name, and "
+            "these are other quantities there.",
+            "Put a TorqueSource in its place, and the controller into the new network.",
+            (placed.part.name,),
+            placed.nodes,
+        )
+        for placed in netlist.placed
+        if placed.part.measures
+    )
+    if problems:
+        raise NetworkError(title, problems)
 
 
 def _store(template: Template, signal: Signal) -> str | None:
