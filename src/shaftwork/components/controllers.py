@@ -17,6 +17,7 @@ from sympy import Add, Expr, Float, Integer
 
 from shaftwork.components.base import Component, Port, Role, Signal, component, number_of
 from shaftwork.components.branches import AcrossLaw, AcrossStore, Branch, ThroughLaw, across_of, measured_of
+from shaftwork.components.laws import t as TIME
 from shaftwork.components.sampling import Sampler
 from shaftwork.core.domains import ELECTRICAL, ROTATION, SIGNAL, TRANSLATION
 from shaftwork.core.errors import ParameterError
@@ -162,6 +163,11 @@ class Controller(Component):
 
     def _refuse_wrong_sizes(self) -> None:
         title = f"{type(self).__name__} '{self.name}'"
+        if strange := {*getattr(self.reference, "free_symbols", ())} - {TIME}:
+            raise ParameterError(
+                f"{title}: reference depends on {min(map(str, strange))}, but may depend on the time t alone. What is "
+                "to follow another quantity measures that one, too."
+            )
         if strange := [kind for kind in self.acts.names if kind not in ACTS]:
             raise ParameterError(f"{title}: acts = {strange[0]!r} is none of: {', '.join(ACTS)}.")
         A, B, C, D = self.matrices()

@@ -57,9 +57,9 @@ class SampledSteps:
     def __init__(
         self, form: StateForm, bind: Callable[[], BoundArrays], instants: Timeline, span: tuple[float, float]
     ) -> None:
-        places = {state.name: k for k, state in enumerate(form.states)}
+        self._places = {state.name: k for k, state in enumerate(form.states)}
         samplers = ((part, part.component.sampler()) for part in form.graph.parts)
-        self._parts = tuple(_placed(part, sampler, places) for part, sampler in samplers if sampler is not None)
+        self._parts = tuple(_placed(part, sampler, self._places) for part, sampler in samplers if sampler is not None)
         self._instants, self._observer = instants, ModelObserver(form, bind, instants)
         self._clearance = CLEARANCE * math.ulp(max(map(abs, span)))
 
@@ -73,12 +73,16 @@ class SampledSteps:
         result = np.array(x, dtype=float)
         for part in (each for each in self._parts if each.is_due(t, self._clearance)):
             sampler, state = part.sampler, x[part.states]
-            measured = [self._observer.signal(name, np.array([before]), x[None])[0] for name in sampler.measured]
-            deviation = sampler.setpoints - np.array(measured)
+            deviation = sampler.setpoints - np.array([self._measured(name, before, x) for name in sampler.measured])
             deviation[0] += part.reference(np.array([after]))[0]
             result[part.outputs] = sampler.C @ state + sampler.D @ deviation
             result[part.states] = sampler.A @ state + sampler.B @ deviation
         return result
+
+    def _measured(self, name: str, t: float, x: Array) -> float:
+        if name in self._places:
+            return float(x[self._places[name]])
+        return float(self._observer.signal(name, np.array([t]), x[None])[0])
 
 
 def _placed(part: GraphPart, sampler: Sampler, places: dict[str, int]) -> _SampledPart:

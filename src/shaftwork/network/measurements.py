@@ -9,14 +9,14 @@ from typing import Any
 
 from sympy import Expr, Integer, Symbol
 
-from shaftwork.components.base import Component, Signal
+from shaftwork.components.base import Component
 from shaftwork.components.branches import MEASURED, End, named_in
 from shaftwork.components.laws import replaced
 from shaftwork.core.domains import ROTATION
 from shaftwork.core.errors import Diagnostic, NetworkError, ShaftworkError
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed, listed
-from shaftwork.network.templates import BranchTemplate, Template, make_template
+from shaftwork.network.templates import BranchTemplate, make_template
 
 AT_NODE, IN_STORE = "node", "store"
 """What a law of a network reads of other parts: the across variable of a node, the through variable of a store."""
@@ -79,25 +79,47 @@ class Measurements:
         raise NotMeasurableError(f"'{name}': there is no part or node '{owner}'. {near}Name one such as J2.omega.")
 
     def _laws_of(self, placed: Placed) -> dict[str, Expr]:
-        """What can be measured of a part: what is across it, and what its springs and inductors let through."""
-        part = placed.part
-        template = make_template(part, self._resolve(part)[0])
-        nodes = dict(zip((port.name for port in part.ports), placed.nodes, strict=False))
-
-        def across(end: End) -> Expr:
-            if end is None or nodes.get(end, "") == REFERENCE:
-                return Integer(0)
-            inner = any(port.name == end for port in part.inner_ports())
-            node = f"{part.name}.{end}" if inner else nodes.get(end)
-            return Integer(0) if node is None else Symbol(f"{AT_NODE} of {node}", real=True)
-
-        laws: dict[str, Expr] = {}
-        for name, signal in part.signals().items():
+        """What can be measured of a part: what its springs and inductors let through, and what is across it."""
+        laws = _stores(placed.part, self._resolve(placed.part)[0])
+        nodes = dict(zip((port.name for port in placed.part.ports), placed.nodes, strict=False))
+        nodes |= {port.name: f"{placed.part.name}.{port.name}" for port in placed.part.inner_ports()}
+        at_rest = any(nodes.get(port.name, REFERENCE) == REFERENCE for port in placed.part.ports if port.optional)
+        for name, signal in placed.part.signals().items():
             if signal.kind == "across":
-                laws[name] = signal.sign * (across(signal.ends[0]) - across(signal.ends[1]))
-            elif (label := _store(template, signal)) is not None:
-                laws[name] = signal.sign * Symbol(f"{IN_STORE} of {part.name}.{label}", real=True)
+                first, second = (_at(nodes, end) for end in signal.ends)
+                laws[name] = signal.sign * (first - second)
+                laws |= {name.removesuffix("_rel"): laws[name]} if at_rest else {}
         return laws
+
+
+def _at(nodes: Mapping[str, str], end: End) -> Expr:
+    """The across variable at an end of a part."""
+    node = REFERENCE if end is None else nodes.get(end, REFERENCE)
+    return Integer(0) if node == REFERENCE else Symbol(f"{AT_NODE} of {node}", real=True)
+
+
+def _stores(part: Component, values: Mapping[str, Any]) -> dict[str, Expr]:
+    """What the springs and inductors of a part let through, by the names of states and of signals.
+
+    Of parts with modes there is none, as a store of one mode may not be there in another.
+    """
+    template = make_template(part, values)
+    ports = {port.name: port for port in (*part.ports, *part.inner_ports())}
+    if template.modes:
+        return {}
+    stores: dict[str, tuple[BranchTemplate, Expr]] = {}
+    for branch in template.branches:
+        if branch.kind is Kind.THROUGH_STORE:
+            domain = next(ports[end].domain for end in branch.ends if end is not None) or ROTATION
+            symbol = Symbol(f"{IN_STORE} of {part.name}.{branch.label}", real=True)
+            stores[branch.label or domain.through.name] = branch, symbol
+    laws: dict[str, Expr] = {name: symbol for name, (_, symbol) in stores.items()}
+    for name, signal in part.signals().items():
+        for branch, symbol in stores.values():
+            alone = signal.kind == "through" and len(template.branches) == 1 and branch.ends == signal.ends
+            if alone or (signal.kind == "store" and branch.label == signal.label):
+                laws[name] = signal.sign * symbol
+    return laws
 
 
 def unmeasurable(netlist: Netlist, resolve: Resolve) -> Iterator[tuple[Placed, str]]:
@@ -137,20 +159,3 @@ def refuse_measuring(netlist: Netlist, title: str) -> None:
     )
     if problems:
         raise NetworkError(title, problems)
-
-
-def _store(template: Template, signal: Signal) -> str | None:
-    """The label of the store that a signal is of alone, "" where it has none; None where others have a part in it."""
-    if template.modes or signal.kind == "twist":
-        return None
-    if signal.kind == "store":
-        stores = [branch for branch in template.branches if branch.kind is Kind.THROUGH_STORE]
-        alike = [branch for branch in stores if branch.label == signal.label] or stores
-    else:
-        alike = [
-            branch
-            for branch in template.branches
-            if branch.terms or not {*branch.ends}.isdisjoint({*signal.ends} - {None})
-        ]
-    only = len(alike) == 1 and alike[0].kind is Kind.THROUGH_STORE and alike[0].ends == signal.ends
-    return alike[0].label if only else None

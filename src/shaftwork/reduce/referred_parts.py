@@ -19,7 +19,7 @@ from shaftwork.core.domains import ROTATION, TRANSLATION, Domain
 from shaftwork.core.errors import NetworkWarning, ShaftworkError
 from shaftwork.core.notices import muted
 from shaftwork.core.parameters import Parameter
-from shaftwork.network.netlist import REFERENCE, Placed, listed
+from shaftwork.network.netlist import REFERENCE, Placed
 from shaftwork.reduce.covariance import does_the_same
 from shaftwork.reduce.kinematics import Scale
 
@@ -156,8 +156,6 @@ def referred_part(item: Placed, nodes: tuple[str, ...], scale: Scale, domain: Do
         scale: of its speeds and powers to those of the reference shaft.
         domain: of the reference shaft.
     """
-    if item.part.measures:
-        return f"it measures {listed(item.part.measures)}, which is another quantity at the reference shaft"
     here = next(port.domain for port in item.part.ports if port.domain in MOTIONS)
     assert here is not None  # noqa: S101 (only mechanical parts are referred)
     if here is not domain and type(item.part) not in COUNTERPARTS:
