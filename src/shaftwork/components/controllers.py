@@ -163,9 +163,9 @@ class Controller(Component):
 
     def _refuse_wrong_sizes(self) -> None:
         title = f"{type(self).__name__} '{self.name}'"
-        if strange := {*getattr(self.reference, "free_symbols", ())} - {TIME}:
+        if others := {*getattr(self.reference, "free_symbols", ())} - {TIME}:
             raise ParameterError(
-                f"{title}: reference depends on {min(map(str, strange))}, but may depend on the time t alone. What is "
+                f"{title}: reference depends on {min(map(str, others))}, but may depend on the time t alone. What is "
                 "to follow another quantity measures that one, too."
             )
         if strange := [kind for kind in self.acts.names if kind not in ACTS]:
@@ -207,19 +207,19 @@ class Controller(Component):
 
     def branches(self, p: Any) -> Iterator[Branch]:
         A, B, C, D = self.matrices()
-        states = [f"x_{k}" for k in range(1, len(A) + 1)]
+        states, sampler = [f"x_{k}" for k in range(1, len(A) + 1)], self.sampler()
         x = [across_of(name) for name in states]
         held = self._held()
         for name in (*states, *(name for name, _ in held)):
             yield AcrossStore(Integer(1), (name, None), name)
-        if not held:
+        if sampler is None:
             asked = [Float(value) if value else Integer(0) for value in self._setpoints().tolist()]
             e = [point - measured_of(name) for point, name in zip(asked, self.measured.names, strict=True)]
             e[0] += p.reference
             for name, row, gains in zip(states, A, B, strict=True):
                 yield ThroughLaw(_sum(row, x) + _sum(gains, e), (None, name), name.replace("x", "w"))
             given = [_sum(row, x) + _sum(gains, e) for row, gains in zip(C, D, strict=True)]
-        else:  # what is asked is read at the instants: it is no part of a law, but of its values
+        else:
             given = [across_of(name) for name, _ in held]
         for law, port, kind in zip(given, self.ports, self.acts.names, strict=True):
             branch = ACTS[kind][1]
@@ -231,7 +231,8 @@ class Controller(Component):
         period = number_of(self, "sample_time")
         if period is None:
             return None
-        return Sampler(period, *self.matrices(), self.measured.names, self._setpoints(), self.reference)
+        reference, _ = self.declared["reference"].magnitude(self.reference)
+        return Sampler(period, *self.matrices(), self.measured.names, self._setpoints(), reference)
 
     def within(self, network: str) -> Self:
         """Under the name of the network; so is what it measures."""

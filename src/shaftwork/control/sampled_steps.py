@@ -70,6 +70,7 @@ class SampledSteps:
         one instant read the same.
         """
         before, after = self._instants.sides(t)
+        after = max(after, t + self._clearance)  # of the law that is asked nobody else knows the jumps
         result = np.array(x, dtype=float)
         for part in (each for each in self._parts if each.is_due(t, self._clearance)):
             sampler, state = part.sampler, x[part.states]

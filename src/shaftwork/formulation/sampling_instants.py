@@ -7,6 +7,8 @@ import math
 from shaftwork.core.errors import ParameterError, SimulationError
 from shaftwork.formulation.form import StateForm
 
+EARLY = 4
+"""So many units in the last place an instant is earlier than k T: rounding moves k T / T and the like by less."""
 MOST = 500_000
 """Samples of a run: each ends a step, at 0.1 ms and more."""
 
@@ -37,7 +39,8 @@ def sampling_instants(form: StateForm, t0: float, t_end: float) -> tuple[float, 
                     "shorter run, or a longer sample_time."
                 )
             instants += [k * sampler.period for k in range(first, last + 1)]
-    return tuple(instants)
+    # An output time that is an instant but for rounding shall show what is held from there on.
+    return tuple(time - EARLY * math.ulp(time) for time in instants)
 
 
 def refuse_sampled(form: StateForm, what: str) -> None:

@@ -74,9 +74,8 @@ class Measurements:
             raise NotMeasurableError(f"'{name}' {why}. Of '{owner}' it can measure: {able}.")
         if owner in self._domains and quantity == self._domains[owner].across.name:
             return Symbol(f"{AT_NODE} of {owner}", real=True)
-        close = get_close_matches(owner, (*self._placed, *self._domains), n=3)
-        near = f"Close to it: {', '.join(close)}. " if close else ""
-        raise NotMeasurableError(f"'{name}': there is no part or node '{owner}'. {near}Name one such as J2.omega.")
+        close = get_close_matches(owner, (*self._placed, *self._domains), n=3) or [*self._placed]
+        raise NotMeasurableError(f"'{name}': there is no part or node '{owner}'. There are: {listed(close)}.")
 
     def _laws_of(self, placed: Placed) -> dict[str, Expr]:
         """What can be measured of a part: what its springs and inductors let through, and what is across it."""
