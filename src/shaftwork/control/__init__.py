@@ -1,1 +1,1 @@
-"""Linear models for other tools: python-control, scipy and CSV."""
+"""Linear models for python-control, scipy and CSV, and what sampled controllers do at their instants."""
