@@ -224,6 +224,7 @@ ASKED: dict[str, tuple[Any, str]] = {
     "transfer function": (lambda net: net.equations().transfer_function("pi.tau", "J2.omega"), "no transfer functions"),
     "state space": (lambda net: net.equations().state_space(), "no transfer functions"),
     "derivatives": (lambda net: sw.studies.motion_sensitivities(net, ["end J2.omega"], t_end=1.0), "derivatives"),
+    "derivatives of frequencies": (sw.studies.frequency_sensitivities, "no frequencies"),
 }
 
 

@@ -190,7 +190,7 @@ class Controller(Component):
         if self.sample_time is None:
             return ()
         several = len(self.acts.names) > 1
-        return tuple((f"u_{k}", f"a_{k}" if several else "a") for k in range(1, len(self.acts.names) + 1))
+        return tuple((f"x_u_{k}", f"a_{k}" if several else "a") for k in range(1, len(self.acts.names) + 1))
 
     def inner_ports(self) -> tuple[Port, ...]:
         """One for each state, and of a sampled one for each output that it holds."""

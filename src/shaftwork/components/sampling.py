@@ -13,7 +13,7 @@ class Sampler:
     """A step of a discrete linear system with a zero-order hold.
 
     Law: at t = k T, u = C x + D e and then x = A x + B e, with e what is asked less what is measured. In between x and
-    u rest: they are across stores of the part, whose labels are x_1, x_2, ... and u_1, u_2, ...
+    u rest: they are across stores of the part, whose labels are x_1, x_2, ... and x_u_1, x_u_2, ...
 
     Args:
         period: T in s.

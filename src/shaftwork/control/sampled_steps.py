@@ -90,6 +90,6 @@ def _placed(part: GraphPart, sampler: Sampler, places: dict[str, int]) -> _Sampl
     law = vectorised((TIME,), as_expression(sampler.reference))
     states, outputs = (
         [places[f"{part.name}.{letter}_{k}"] for k in range(1, count + 1)]
-        for letter, count in (("x", len(sampler.A)), ("u", len(sampler.C)))
+        for letter, count in (("x", len(sampler.A)), ("x_u", len(sampler.C)))
     )
     return _SampledPart(sampler, lambda t: np.zeros_like(t) + law(t), states, outputs)

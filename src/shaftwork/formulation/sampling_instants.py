@@ -13,11 +13,6 @@ MOST = 500_000
 """Samples of a run: each ends a step, at 0.1 ms and more."""
 
 
-def has_samples(form: StateForm) -> bool:
-    """Whether a part of a network acts at sampling instants alone."""
-    return any(part.component.sampler() is not None for part in form.graph.parts)
-
-
 def sampling_instants(form: StateForm, t0: float, t_end: float) -> tuple[float, ...]:
     """The instants in s of a run at which controllers sample.
 

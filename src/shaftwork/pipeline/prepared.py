@@ -18,10 +18,10 @@ from shaftwork.codegen.compiled_model import CompiledModel
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.codegen.timeline import Timeline
 from shaftwork.codegen.undefined_laws import rough, without_value
+from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import AccuracyWarning
 from shaftwork.core.notices import warn
 from shaftwork.formulation.form import StateForm
-from shaftwork.formulation.sampling_instants import has_samples
 from shaftwork.integrate.engines import ENGINES, too_fine
 from shaftwork.integrate.problem import Fractions, LinearInputs, Observed, Problem
 from shaftwork.network.graph import GROUND
@@ -110,11 +110,15 @@ class Prepared:
         Args:
             span: start and end of the run, s.
         """
-        if not has_samples(self.form):
+        if not self.form.samples:
             return None
         from shaftwork.control.sampled_steps import SampledSteps
 
-        return SampledSteps(self.form, lambda: self.bound, self.instants(span), span)
+        return self._sampled(span, lambda: SampledSteps(self.form, lambda: self.bound, self.instants(span), span))
+
+    @cached_property
+    def _sampled(self) -> BoundedCache[tuple[float, float], Callable[[float, Array], Array]]:
+        return BoundedCache(1)
 
     def _jump(self, span: tuple[float, float]) -> Callable[[float, Array], Array] | None:
         """What a run does at an instant: first what is sampled, then the impulses of sources that jump."""

@@ -65,6 +65,7 @@ def frequency_sensitivities(
         SimulationError: two modes have the same rate.
     """
     model = network_of(net).compile()
+    refuse_sampled(model.form, "it has no frequencies")
     equations, p, time, x, _ = model.point({}, at, t)
     names = smooth_parameters(model, _listed(parameters), (model, equations))
     rows = rows_of(equations)
