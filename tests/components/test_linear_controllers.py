@@ -201,8 +201,9 @@ def test_controllers_of_two_rates_act_each_at_its_own_instants() -> None:
     np.testing.assert_allclose(motion["fast.tau"][instants], 1.0 - motion["J1.omega"][instants], atol=1e-12)
 
 
-def test_the_same_instants_are_met_by_a_sweep_of_parameters() -> None:
-    net = plant(sampled_pi())
+@pytest.mark.parametrize("part", [pi_controller(), sampled_pi()], ids=["continuous", "sampled"])
+def test_a_sweep_is_the_motions_of_its_variants(part: sw.Component) -> None:
+    net = plant(part)
     table = sw.studies.sweep(net, {"shaft.c": [90.0, 110.0]}, t_end=1.0, measures=["end J2.omega"])
     single = [net.simulate(1.0, parameters={"shaft.c": c})["J2.omega"][-1] for c in (90.0, 110.0)]
     np.testing.assert_allclose(table.measures["end J2.omega"], single, rtol=1e-9)
@@ -314,14 +315,16 @@ def test_a_controller_within_a_network_measures_what_stands_beside_it() -> None:
     drive = sw.Network("drive", ports=("out",))
     drive.add(sw.Inertia("J1", J=1.0), "rotor")
     drive.add(sw.Spring("s", c=100.0, d=1.0), "rotor", "out")
-    drive.add(sw.TransferFunctionController("p", numerator=2.0, denominator=1.0, measured="J1.omega"), "rotor")
+    gains = {"D": [[2.0, 1.0, 0.5]], "measured": ["J1.omega", "rotor.omega", "out.omega"]}
+    drive.add(sw.StateSpaceController("p", **gains), "rotor")
     net = sw.Network("two drives")
     for name in ("first", "second"):
         net.add(drive, "shaft", name=name)
     net.add(sw.Inertia("load", J=2.0), "shaft")
     motion = net.simulate(1.0, initial={"first.J1.omega": 3.0})
-    np.testing.assert_allclose(motion["first.p.tau"], -2.0 * motion["first.J1.omega"], atol=1e-12)
-    np.testing.assert_allclose(motion["second.p.tau"], -2.0 * motion["second.J1.omega"], atol=1e-12)
+    for name in ("first", "second"):
+        wanted = -3.0 * motion[f"{name}.J1.omega"] - 0.5 * motion["load.omega"]
+        np.testing.assert_allclose(motion[f"{name}.p.tau"], wanted, atol=1e-12)
 
 
 def test_from_control_takes_matrices_names_and_sample_time() -> None:

@@ -237,9 +237,9 @@ class Component:
         """How its inner stores change at sampling instants; by default there are none."""
         return None
 
-    def within(self, network: str) -> Self:
-        """The same part as it is named inside a network that is a part of another."""
-        return self.changed(name=f"{network}.{self.name}")
+    def within(self, names: Mapping[str, str]) -> Self:
+        """The same part in a network that is a part of another, from the new names of its parts and nodes."""
+        return self.changed(name=names[self.name])
 
     def changed(self, **values: Any) -> Self:
         """The same part with other values, of which its author has been warned already."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ast
 import reprlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
@@ -234,10 +234,11 @@ class Controller(Component):
         reference, _ = self.declared["reference"].magnitude(self.reference)
         return Sampler(period, *self.matrices(), self.measured.names, self._setpoints(), reference)
 
-    def within(self, network: str) -> Self:
-        """Under the name of the network; so is what it measures."""
-        measured = Listed([f"{network}.{name}" for name in self.measured.names])
-        return self.changed(name=f"{network}.{self.name}", measured=measured)
+    def within(self, names: Mapping[str, str]) -> Self:
+        """Under its new name, with what it measures under the new names of its parts and nodes."""
+        parted = (name.rpartition(".") for name in self.measured.names)
+        measured = [f"{names.get(owner, owner)}.{quantity}" for owner, _, quantity in parted]
+        return self.changed(name=names[self.name], measured=measured)
 
 
 def _sum(factors: Any, terms: Sequence[Expr]) -> Expr:
