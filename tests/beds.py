@@ -19,6 +19,13 @@ VALUES = {
     "FrequencyDrive": {"tau_k": 5.0, "s_k": 0.3, "n_sync": 100.0, "t_ramp": 0.3, "f_end": 80.0, "boost": 0.2},
     "PullOutDrive": {"tau_k": 5.0, "s_k": 0.3, "n_sync": 60.0, "overspeed": 2.0, "efficiency": 0.9},
     "SpeedController": {"omega_ref": 4.0, "k_p": 1.0, "t_i": 3.0, "tau_max": 50.0},
+    "StateSpaceController": {"measured": ["store0.omega"], "A": 0.0, "B": 1.0, "C": 2.0, "D": 1.5, "reference": 4.0},
+    "TransferFunctionController": {
+        "measured": "store0.omega",
+        "numerator": [1.5, 2.0],
+        "denominator": [1.0, 3.0],
+        "reference": 4.0,
+    },
     "CoulombLoad": {"tau": 2.0, "omega_s": 0.3},
     "HardStop": {"upper": 0.1, "c": 5.0, "omega_rest": 1e-3},
     "LossyGear": {"ratio": 2.5, "efficiency": 0.8},

@@ -41,6 +41,7 @@ if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
     )
     from shaftwork.components.bucket_wheel import *
     from shaftwork.components.contacts import *
+    from shaftwork.components.controllers import *
     from shaftwork.components.sources import *
     from shaftwork.components.excitations import *
     from shaftwork.components.harmonics import Harmonics as Harmonics

@@ -24,6 +24,7 @@ USES = {
     "sizing": "sw.sizing.duty",
     "drawing": "net.draw()",
     "analogues": "net.circuit().simulate(0.1)",
+    "control": "net.compile().linearize().to_scipy()",
     "studies": "sw.studies.work_precision",
     "animation": "net.simulate(0.1).animate()",
     "spectra": "net.simulate(0.1).spectrum('shaft.tau')",
@@ -34,6 +35,7 @@ USES = {
 """By feature, something small that takes it."""
 
 NEEDS = {
+    "control": ("frequency",),
     "reporting": ("latex", "drawing", "modelfiles"),
     "live": ("reporting", "latex", "drawing", "modelfiles", "frequency", "animation"),
 }

@@ -25,6 +25,7 @@ from shaftwork.core.domains import ELECTRICAL, ROTATION, Domain
 from shaftwork.formulation.form import Names, StateForm, integral_name, state_form, store_name
 from shaftwork.network.graph import CircuitGraph, GraphPart, build_graph
 from shaftwork.network.kinds import Kind
+from shaftwork.network.measurements import refuse_measuring
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
 
 READ = {ACROSS: u, INTEGRAL: psi, **IN_LAWS}
@@ -38,6 +39,7 @@ def circuit(netlist: Netlist, form: StateForm) -> Analogy:
         netlist: of the network.
         form: its state form.
     """
+    refuse_measuring(netlist, f"'{netlist.name}' has no circuit")
     work = _Circuit(netlist, form)
     placed: list[Placed] = []
     for item, part in zip(netlist.placed, form.graph.parts, strict=True):

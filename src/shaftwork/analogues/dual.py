@@ -30,6 +30,7 @@ from shaftwork.core.errors import Diagnostic, NetworkError
 from shaftwork.formulation.form import Names, StateForm, integral_name, state_form
 from shaftwork.network.graph import CircuitGraph, GraphPart, build_graph, ends_of
 from shaftwork.network.kinds import Kind
+from shaftwork.network.measurements import refuse_measuring
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed, listed, title
 
 OTHERWISE = "Take net.circuit(), which every network has"
@@ -61,6 +62,7 @@ def dual(netlist: Netlist, form: StateForm) -> Analogy:
         NetworkError: a part has no dual, or the graph is not planar.
     """
     title_of_error = f"'{netlist.name}' has no dual"
+    refuse_measuring(netlist, title_of_error)
     reasons = ((part, _reason(part, form.graph)) for part in form.graph.parts)
     if problems := tuple(_without_dual(part, why, form.graph) for part, why in reasons if why):
         raise NetworkError(title_of_error, problems)

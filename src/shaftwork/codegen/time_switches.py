@@ -29,6 +29,7 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import ParameterError
 from shaftwork.formulation.form import StateForm
+from shaftwork.formulation.sampling_instants import sampling_instants
 from shaftwork.network.graph import GraphPart
 from shaftwork.network.kinds import Kind
 from shaftwork.numerics.tolerances import CLEARANCE
@@ -143,6 +144,7 @@ class Switching:
         self._unsolved = tuple(_unsolved(form))
         every = (*self._switches, *self._narrow, *self._unsolved)
         self._places = sorted({place for one in every for place in one.places})
+        self._form = form
         self._timelines = BoundedCache[tuple[bytes, float, float, bool], Timeline](8)
 
     def known(self, p: Array) -> tuple[float, ...]:
@@ -186,7 +188,7 @@ class Switching:
         Raises:
             ParameterError: a law switches too often to be followed.
         """
-        if not self._switches and not self._narrow and not self._unsolved:
+        if not (self._switches or self._narrow or self._unsolved or self._form.samples):
             return NOTHING
         key = (p[self._places].tobytes(), t0, t_end, modes)
         return self._timelines(key, lambda: self._searched(p, t0, t_end, modes=modes))
@@ -198,7 +200,8 @@ class Switching:
                 raise _too_often(switch, t0, t_end)
             instants += changes
         sampled = (bumps(one.course(p), t0, t_end).tolist() for one in self._unsolved)
-        return timeline(instants, t0, t_end, (*_inside(self._narrow, p, t0, t_end), *chain.from_iterable(sampled)))
+        stops = (*_inside(self._narrow, p, t0, t_end), *chain.from_iterable(sampled))
+        return timeline(instants, t0, t_end, (*stops, *sampling_instants(self._form, t0, t_end)))
 
 
 def _switches(form: StateForm) -> Iterator[_Switch]:

@@ -13,6 +13,7 @@ FAMILIES = (
     "friction",
     "shafts",
     "sources",
+    "controllers",
     "excitations",
     "loads",
     "bucket_wheel",

@@ -13,7 +13,8 @@ from sympy import Expr, Symbol
 
 from shaftwork.components.branches import Branch, End, is_pair
 from shaftwork.components.modes import Modes
-from shaftwork.core.domains import DOMAIN_NAMES, DOMAINS, ELECTRICAL, ROTATION, Domain
+from shaftwork.components.sampling import Sampler
+from shaftwork.core.domains import DOMAIN_NAMES, DOMAINS, ELECTRICAL, ROTATION, SIGNAL, Domain
 from shaftwork.core.errors import NetworkWarning, ParameterError, ShaftworkError
 from shaftwork.core.notices import muted
 from shaftwork.core.parameters import Parameter, is_label, parameter, refuse_fields
@@ -36,7 +37,7 @@ class Port:
         refuse_fields(
             self,
             name=(is_label(self.name), "a text without dots, such as 'a'"),
-            domain=(self.domain is None or self.domain in DOMAINS, f"{DOMAIN_NAMES}, or None for any node"),
+            domain=(self.domain is None or self.domain in (*DOMAINS, SIGNAL), f"{DOMAIN_NAMES}, or None for any node"),
             optional=(isinstance(self.optional, bool), "True or False"),
         )
 
@@ -64,7 +65,7 @@ class Signal:
             self,
             kind=(self.kind in SIGNAL_KINDS, f"one of {', '.join(map(repr, SIGNAL_KINDS))}"),
             ends=(is_pair(self.ends), _PAIR),
-            domain=(self.domain is None or self.domain in DOMAINS, f"{DOMAIN_NAMES}, or None"),
+            domain=(self.domain is None or self.domain in (*DOMAINS, SIGNAL), f"{DOMAIN_NAMES}, or None"),
             sign=(self.sign in (1, -1), "1 or -1"),
             label=(self.label == "" or is_label(self.label), "a text without dots"),
         )
@@ -181,6 +182,7 @@ class Component:
     ports: ClassVar[tuple[Port, ...]] = (Port("a"), Port("b"))
     inner: ClassVar[tuple[Port, ...]] = ()
     signal_ports: ClassVar[frozenset[str]] = frozenset()  # inner ports of signals: what is stored there is no energy
+    measures: ClassVar[tuple[str, ...]] = ()  # quantities of other parts that its laws read, by `measured_of`
     letters: ClassVar[Mapping[Symbol, Expr]] = {}  # in laws of users, beside those of its domain: what they stand for
     role: ClassVar[Role] = "store"
     swing: ClassVar[str] = ""  # the parameter that, at zero, leaves a law that swings with an angle its mean
@@ -230,6 +232,14 @@ class Component:
     def inner_ports(self) -> tuple[Port, ...]:
         """The nodes inside the part; by default the same for all parts of the class."""
         return self.inner
+
+    def sampler(self) -> Sampler | None:
+        """How its inner stores change at sampling instants; by default there are none."""
+        return None
+
+    def within(self, names: Mapping[str, str]) -> Self:
+        """The same part in a network that is a part of another, from the new names of its parts and nodes."""
+        return self.changed(name=names[self.name])
 
     def changed(self, **values: Any) -> Self:
         """The same part with other values, of which its author has been warned already."""
@@ -376,25 +386,3 @@ def number_of(part: Component, name: str) -> float | None:
     """A parameter in SI, None where it is left out or is no admissible number, which the checks of a network report."""
     value, objection = part.declared[name].magnitude(getattr(part, name))
     return value if objection is None and isinstance(value, float) else None
-
-
-def refuse_no_time_on(part: Component, does: str = "gives torque") -> None:
-    """Refuse times between which a part never does anything.
-
-    Args:
-        part: with `t_on` and `t_off`.
-        does: what it then never does.
-
-    Raises:
-        ParameterError: `t_off` is not later than `t_on`.
-    """
-    start, end = number_of(part, "t_on"), number_of(part, "t_off")
-    if start is not None and end is not None and end <= start:
-        twice = (
-            f" Where it is to be on up to {end:g} s and again from {start:g} s, give two parts: one with "
-            f"t_off = {end:g} alone, one with t_on = {start:g} alone."
-        )
-        raise ParameterError(
-            f"{type(part).__name__} '{part.name}': t_off = {end:g} s is not later than t_on = {start:g} s, so that it "
-            f"never {does}. Give t_off > t_on, or leave one of them out.{twice if 0 < end < start else ''}"
-        )

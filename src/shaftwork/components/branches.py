@@ -64,6 +64,15 @@ def integral_of(label: str) -> Symbol:
     return Symbol(f"integral of {label}", real=True)
 
 
+MEASURED = "measured"
+"""What symbols of `measured_of` say that they stand for."""
+
+
+def measured_of(name: str) -> Symbol:
+    """In a law of a part that `measures` it: a quantity of another part or node, "J2.omega", "shaft.tau_c"."""
+    return Symbol(f"{MEASURED} of {name}", real=True)
+
+
 def named_in(symbol: Symbol) -> tuple[str, str]:
     """What `across_of`, `through_of`, `integral_of` or `RATE` stands for: its kind and the name; else ("", "")."""
     kind, of, name = symbol.name.partition(" of ")

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from sympy import And, Expr, Heaviside, Integer, Not, Piecewise, Rational, cos, pi, sin, sqrt
 
-from shaftwork.components.base import Component, Port, Role, Signal, component, refuse_no_time_on
+from shaftwork.components.base import Component, Port, Role, Signal, component
 from shaftwork.components.branches import (
     ACROSS,
     INTEGRAL,
@@ -26,6 +26,7 @@ from shaftwork.components.friction import STUCK, conducting, ends, is_past, onse
 from shaftwork.components.laws import as_expression, i, q, t
 from shaftwork.components.modes import ANEW, Leave, Mode, Modes
 from shaftwork.components.motors import on_time
+from shaftwork.components.switch_times import refuse_no_time_on
 from shaftwork.core.domains import ELECTRICAL, ROTATION
 from shaftwork.core.parameters import parameter
 

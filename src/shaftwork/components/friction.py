@@ -10,10 +10,11 @@ from typing import Any, ClassVar
 from sympy import And, Expr, Min, Ne, Not, exp, false
 from sympy.logic.boolalg import Boolean
 
-from shaftwork.components.base import Component, Port, Role, component, number_of, refuse_no_time_on
+from shaftwork.components.base import Component, Port, Role, component, number_of
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH, Branch, End, ThroughLaw, rigid
 from shaftwork.components.laws import as_expression, no_less, t
 from shaftwork.components.modes import ANEW, Leave, Mode, Modes
+from shaftwork.components.switch_times import refuse_no_time_on
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter
 

@@ -9,9 +9,10 @@ from typing import Any, ClassVar
 
 from sympy import Expr, Mul, Piecewise, pi, sqrt
 
-from shaftwork.components.base import Component, Derived, Port, Role, component, number_of, refuse_no_time_on
+from shaftwork.components.base import Component, Derived, Port, Role, component, number_of
 from shaftwork.components.branches import ACROSS, Branch, ThroughLaw
 from shaftwork.components.laws import no_less, t
+from shaftwork.components.switch_times import refuse_no_time_on
 from shaftwork.components.tables import Interpolation, Table
 from shaftwork.core.errors import NetworkWarning, ParameterError
 from shaftwork.core.notices import warn

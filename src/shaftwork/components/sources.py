@@ -7,10 +7,11 @@ from typing import Any, ClassVar
 
 from sympy import Expr
 
-from shaftwork.components.base import Component, Port, Role, Signal, component, number_of, refuse_no_time_on
+from shaftwork.components.base import Component, Port, Role, Signal, component, number_of
 from shaftwork.components.branches import ACROSS, AcrossLaw, Branch, ThroughLaw, ThroughStore, across_of, through_of
 from shaftwork.components.laws import larger, smaller
 from shaftwork.components.motors import off_time, on_time, while_on
+from shaftwork.components.switch_times import refuse_no_time_on
 from shaftwork.core.domains import ROTATION, TRANSLATION
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter

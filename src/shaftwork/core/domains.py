@@ -42,6 +42,13 @@ ELECTRICAL = Domain(
     through=Quantity("i", "i", "A"),
     integral=Quantity("psi", r"\psi", "V*s"),
 )
+SIGNAL = Domain(
+    "signal",
+    across=Quantity("x", "x", "1"),
+    through=Quantity("w", "w", "1/s"),
+    integral=Quantity("z", "z", "s"),
+)
+"""What the states of a controller are in: numbers, whose product with their rates is no power."""
 DOMAINS = (ROTATION, TRANSLATION, ELECTRICAL)
 DOMAIN_NAMES = "ROTATION, TRANSLATION or ELECTRICAL of this package"
 """What a user can give as a domain, in words."""

@@ -43,6 +43,8 @@ SHAPES: Mapping[str, str] = {
     "HardStop": "stop",
     "Rope": "rope",
     "SpeedController": "controller",
+    "StateSpaceController": "controller",
+    "TransferFunctionController": "controller",
     "Resistor": "resistor",
     "Inductor": "inductor",
     "Capacitor": "capacitor",

@@ -29,6 +29,9 @@ WORDS = {
     "u": "voltage",
     "i": "current",
     "psi": "flux linkage",
+    "x": "state of a controller",
+    "w": "rate of that state",
+    "z": "integral of that state",
 }
 """The quantities of the domains in words."""
 

@@ -83,6 +83,9 @@ class SolvedForm:
 
     assembly: Assembly
 
+    def __getstate__(self) -> dict[str, Assembly]:
+        return {"assembly": self.assembly}  # what is pickled; the systems are made anew
+
     @cached_property
     def speeds(self) -> EliminationSystem:
         """d(across)/dt of the tree's stores: referred inertias times accelerations."""

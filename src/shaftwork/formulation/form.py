@@ -178,6 +178,11 @@ class StateForm:
         return bool(speeds or (self.dependent_through and any(True for _ in torques)))
 
     @cached_property
+    def samples(self) -> bool:
+        """Whether a part acts at sampling instants."""
+        return any(part.component.sampler() is not None for part in self.graph.parts)
+
+    @cached_property
     def states(self) -> tuple[State, ...]:
         """The states: speeds of the tree's stores, torques of the links' stores, integrals."""
         return (

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -144,6 +145,44 @@ class LinearModel:
             SignalError: there is no such input or output.
         """
         return frequency_response(self.title, self.slopes, StateEquations(self.slopes), (input, output), f)
+
+    def to_control(self) -> Any:
+        """A `control.StateSpace` of python-control: z are its states, and names have ":" in place of each ".".
+
+        A name also has parentheses in place of brackets. Where B1 is not zero the states are z = x - B1 v.
+
+        Raises:
+            MissingExtraError: python-control is not installed (extra `control`).
+            ParameterError: two names are one in python-control.
+            SimulationError: an output depends on the rate of an input, D1; says which.
+        """
+        from shaftwork.control.linear_export import as_control
+
+        return as_control(self)
+
+    def to_scipy(self) -> Any:
+        """A `scipy.signal.StateSpace`, without names: states, inputs and outputs in the order of this model.
+
+        Raises:
+            SimulationError: an output depends on the rate of an input, D1; says which.
+        """
+        from shaftwork.control.linear_export import as_scipy
+
+        return as_scipy(self)
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write the matrices with their names.
+
+        Args:
+            path: a file, "linear.csv", for one table [A B; C D] with states and outputs as rows, states and inputs as
+                columns; or a folder, for A.csv, B.csv, C.csv and D.csv. Where D1 is not zero it is there, too.
+
+        Raises:
+            ParameterError: there is no folder for the file, or the folder's name is that of a file.
+        """
+        from shaftwork.control.linear_export import write_csv
+
+        write_csv(self, path)
 
     def __repr__(self) -> str:
         pairs = (self.states, "state"), (self.inputs, "input"), (self.outputs, "output")

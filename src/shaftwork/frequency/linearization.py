@@ -27,6 +27,7 @@ from shaftwork.components.law_slopes import jumps, slope
 from shaftwork.core.errors import SimulationError
 from shaftwork.core.notices import hint
 from shaftwork.formulation.form import StateForm
+from shaftwork.formulation.sampling_instants import refuse_sampled
 from shaftwork.formulation.source_inputs import places_of, with_inputs
 from shaftwork.network.graph import GROUND, GraphPart
 from shaftwork.network.kinds import Kind
@@ -67,6 +68,7 @@ class Linearization:
     def __init__(
         self, model: CompiledModel, p: Array, x: Array, t: float, inputs: Sequence[str], arriving: Array | None = None
     ) -> None:
+        refuse_sampled(model.form, "no matrices A, B, C, D hold its motion")
         if arriving is None:
             refuse_waves(model.form)
         places = places_of(model.form.graph, inputs)

@@ -6,6 +6,7 @@ after another until all of them are consistent with the motion that follows, and
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -100,6 +101,7 @@ class HybridRun:
         self.engine, self.why, self.steps = "", "", 0
         self.waves: WaveRun | None = None
         self._soon = [0] * len(CHATTER)
+        self._sampled_at = -math.inf
         self._duration = demand.span[1] - demand.span[0]
 
     def march(self, initial: Mapping[str, float] | None) -> None:
@@ -112,6 +114,7 @@ class HybridRun:
     def begin(self, initial: Mapping[str, float] | None) -> HybridState:
         """The states and modes at the start."""
         start, begins = self.demand.span[0], self._shared.begins
+        self._sampled_at = -math.inf
         if self.event_iteration.transfer.regime(self.equation_sets.first).equations.model.form.waves:
             begins = []  # what leaves the ends before the start is of the run
         if isinstance(initial, Ending):
@@ -122,6 +125,8 @@ class HybridRun:
             state, transitions = self._started(initial)
             if initial is None:
                 begins.append((state, transitions))
+        state, further = self._past_samples(start, state)
+        transitions = [*transitions, *further]
         if initial and start != 0 and not isinstance(initial, Ending):
             for machine, mode in zip(self.equation_sets.machines, state.regime.modes, strict=True):
                 warn_of_what_may_have_begun(machine.name, machine.modes, mode, start)
@@ -284,11 +289,17 @@ class HybridRun:
             # an output at an event belongs to the next phase, which has it too
             trajectory = replace(trajectory, t=trajectory.t[:-1], x=trajectory.x[:-1])
         self.segments.append(Segment(trajectory, tuple(in_place.phases)))
-        return t, self._next_state(t, x[: state.x.size], in_place, trajectory.met)
+        state = self._next_state(t, x[: state.x.size], in_place, trajectory.met)
+        if trajectory.met is not None:  # where a guard is met at a sampling instant, its event comes first
+            state, transitions = self._past_samples(t, state)
+            self.note(t, transitions)
+        return t, state
 
     def _next_state(self, t: float, x: Array, in_place: InPlaceEvents, met: int | None) -> HybridState:
         """What goes on at the end of a run of the engine, from its states (n,) and the guard that is met, or None."""
         state = HybridState(in_place.regime, x, in_place.bands)
+        if met is None:
+            state = self._sampled(t, state)
         sides = self.timeline(state.regime).sides(t)
         if met is not None and in_place.beyond is not None and sides == (t, t):
             state, transitions = in_place.beyond
@@ -305,6 +316,20 @@ class HybridRun:
         state, transitions = self.event_iteration.run(t, after, state, met)
         self.note(t, transitions)
         return state
+
+    def _sampled(self, t: float, state: HybridState) -> HybridState:
+        """The same modes with what controllers hold after a time in s; the same state where none samples then."""
+        sampled = state.regime.equations.prepared(state.regime.p).sampled(self.demand.span)
+        if sampled is None or not self._sampled_at < t < self.demand.span[1]:
+            return state
+        self._sampled_at, x = t, sampled(t, state.x)
+        return state if (x == state.x).all() else state._replace(x=x)
+
+    def _past_samples(self, t: float, state: HybridState) -> EventOutcome:
+        """What goes on after what is sampled at a time in s, and the transitions that follow from it."""
+        if (sampled := self._sampled(t, state)) is state:
+            return state, []
+        return self.event_iteration.run(t, self.timeline(state.regime).sides(t)[1], sampled, None)
 
     def _outputs(self, t: float, end: float) -> Array | None:
         """The output times of a phase: an event belongs to the next one."""

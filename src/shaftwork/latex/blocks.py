@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from sympy import Add, Expr, Float, Symbol, preorder_traversal
 
 from shaftwork.components.noise import HeldNoise, SmoothNoise
-from shaftwork.core.domains import ELECTRICAL, ROTATION, TRANSLATION
+from shaftwork.core.domains import ELECTRICAL, ROTATION, SIGNAL, TRANSLATION
 from shaftwork.core.errors import CompileError
 from shaftwork.equations.assembly import Sides, sides, terms_of
 from shaftwork.equations.dimensions import unit_of
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 AUXILIARY = (r"\sigma", r"\zeta", r"\xi", r"\chi")
 """Letters for sums that occur more than once in a law, such as a slip."""
 ORDINALS = ("first", "second", "third")
-BALANCES = {ROTATION: "torques", TRANSLATION: "forces", ELECTRICAL: "currents"}
+BALANCES = {ROTATION: "torques", TRANSLATION: "forces", ELECTRICAL: "currents", SIGNAL: "rates"}
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from shaftwork.core.errors import Diagnostic, ShaftworkError
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart, resolve, signals_of
 from shaftwork.network.kinds import Kind
 from shaftwork.network.law_faults import Fault, instead_of, law_faults
+from shaftwork.network.measurements import unmeasurable
 from shaftwork.network.netlist import (
     MAXIMUM_NAME,
     REFERENCE,
@@ -59,6 +60,7 @@ def examine(netlist: Netlist) -> tuple[Netlist, tuple[Diagnostic, ...]]:
     work = _Examination(netlist)
     for placed in netlist.placed:
         work.take(placed)
+    work.leave_out_blind()
     if not netlist.placed:
         work.report("empty network", f"'{netlist.name}' has no parts.", "Add parts: net.add(part, 'node').")
     return dataclasses.replace(netlist, placed=tuple(work.usable), ports=()), tuple(work.problems)
@@ -91,6 +93,12 @@ class _Examination:
         sound = self._with_values(renamed)
         if fits and sound is not None:
             self.usable.append(dataclasses.replace(placed, part=sound))
+
+    def leave_out_blind(self) -> None:
+        """Leave out the parts that measure what none of the others has."""
+        for placed, fault in unmeasurable(Netlist("", tuple(self.usable)), resolve):
+            self.report("measurement", f"{title(placed.part)}: {fault}", "Correct measured.", placed, "measured")
+            self.usable.remove(placed)
 
     def _with_name(self, placed: Placed) -> Component:
         """The part under a name that no other part has."""

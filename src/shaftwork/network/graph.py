@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -17,6 +17,7 @@ from shaftwork.components.modes import ModeChoice, Modes
 from shaftwork.components.tables import Table
 from shaftwork.core.domains import ROTATION, Domain
 from shaftwork.network.kinds import Kind
+from shaftwork.network.measurements import AT_NODE, IN_STORE, Measurements
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed, overview
 from shaftwork.network.templates import BranchTemplate, Choices, Shared, Template, make_template, with_factors
 
@@ -255,6 +256,9 @@ def build_graph(netlist: Netlist) -> CircuitGraph:
         consulted = tuple(name for name in read if isinstance(values.get(name), float))
         parts.append(GraphPart(part, nodes, places, numbers, template.derived, template.modes, consulted))
     names = tuple(table.numbers)[1:]
+    if any(part.component.measures for part in parts):
+        measured = Measurements(netlist, resolve).placed
+        branches = [replace(branch, template=measured(branch.template)) for branch in branches]
     return CircuitGraph(
         netlist.name, names, tuple(table.domains), tuple(parts), tuple(branches), parameters, tuple(zeros)
     )
@@ -346,10 +350,21 @@ def readings_of(graph: CircuitGraph, branch: int) -> Mapping[Symbol, Reading]:
             readings[symbol] = Reading("across", part.nodes[name])
         elif kind == "rate":
             readings[symbol] = Reading("rate", branch)
+        elif kind == AT_NODE:
+            readings[symbol] = Reading("across", graph.nodes.index(name))
+        elif kind == IN_STORE:
+            owner, _, label = name.rpartition(".")
+            other = next(each for each in graph.parts if each.name == owner)
+            readings[symbol] = Reading("through", _carrying(graph, other, "through", label))
         else:
-            of = next(k for k in part.branches if _stands_for(graph.branches[k].template, kind, name))
+            of = _carrying(graph, part, kind, name)
             readings[symbol] = Reading("through" if kind == "through" else "integral", of)
     return readings
+
+
+def _carrying(graph: CircuitGraph, part: GraphPart, kind: str, label: str) -> int:
+    """The branch of a part that a law reads under a label."""
+    return next(k for k in part.branches if _stands_for(graph.branches[k].template, kind, label))
 
 
 def _stands_for(template: BranchTemplate, kind: str, label: str) -> bool:

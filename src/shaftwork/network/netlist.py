@@ -103,10 +103,10 @@ class Netlist:
             raise ParameterError(f"Network '{self.name}': its port '{strange[0]}' is no node. Its nodes are: {names}.")
         outside = {**{node: f"{name}.{node}" for node in inside}, REFERENCE: REFERENCE}
         outside |= dict(zip(self.ports, nodes, strict=True))
+        renamed = {**outside, **{item.part.name: f"{name}.{item.part.name}" for item in self.placed}}
 
         def moved(item: Placed) -> Placed:
-            part = item.part.changed(name=f"{name}.{item.part.name}")
-            return replace(item, part=part, nodes=tuple(outside[node] for node in item.nodes))
+            return replace(item, part=item.part.within(renamed), nodes=tuple(outside[node] for node in item.nodes))
 
         return tuple(map(moved, self.placed))
 

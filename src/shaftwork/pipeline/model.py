@@ -201,6 +201,8 @@ class Model(CompiledModel):
 
     def _run(self, prepared: Prepared, initial: Given, demand: Demand) -> Solution:
         x0, waves = self.start(prepared, initial, demand.span)
+        if (sampled := prepared.sampled(demand.span)) is not None:
+            x0 = sampled(demand.span[0], x0)
         problem, bind = prepared.problem(x0, demand), lambda: prepared.bound
         if self.form.doubtful:
             refuse_vanishing(self.form, bind, lambda: np.array([problem.t0]), lambda _: x0[None])

@@ -18,6 +18,7 @@ from shaftwork.codegen.compiled_model import CompiledModel
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.codegen.timeline import Timeline
 from shaftwork.codegen.undefined_laws import rough, without_value
+from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import AccuracyWarning
 from shaftwork.core.notices import warn
 from shaftwork.formulation.form import StateForm
@@ -108,6 +109,31 @@ class Prepared:
         """The time at which inputs are read once what jumps at the start has jumped, s."""
         return self.instants(span).sides(span[0])[1]
 
+    def sampled(self, span: tuple[float, float]) -> Callable[[float, Array], Array] | None:
+        """From a time in s and the states then to those after what controllers sample; None where none does.
+
+        Args:
+            span: start and end of the run, s.
+        """
+        if not self.form.samples:
+            return None
+        from shaftwork.control.sampled_steps import SampledSteps
+
+        return self._sampled(span, lambda: SampledSteps(self.form, lambda: self.bound, self.instants(span), span))
+
+    @cached_property
+    def _sampled(self) -> BoundedCache[tuple[float, float], Callable[[float, Array], Array]]:
+        return BoundedCache(1)
+
+    def _jump(self, span: tuple[float, float]) -> Callable[[float, Array], Array] | None:
+        """What a run does at an instant: first what is sampled, then the impulses of sources that jump."""
+        sampled, instants = self.sampled(span), self.instants(span)
+        if not self.form.has_impulses:
+            return sampled
+        if sampled is None:
+            return lambda t, x: self.bound.impulse(x, *instants.sides(t))
+        return lambda t, x: self.bound.impulse(sampled(t, x), *instants.sides(t))
+
     def taken_up(self, ending: Ending, after: float) -> Array:
         """The states (n,) that go on with what another motion stored, after what jumps at that instant.
 
@@ -141,7 +167,7 @@ class Prepared:
             rtol=demand.rtol,
             overall=demand.sizes.overall,
             breakpoints=tuple(time for time in instants.stops if span[0] < time < span[1]),
-            jump=(lambda t, x: self.bound.impulse(x, *instants.sides(t))) if self.form.has_impulses else None,
+            jump=self._jump(span),
             sides=instants.sides,
             switches=(lambda t, x: self.bound.switches(t, x))  # noqa: PLW0108 (which makes the matrices)
             if model.arrays.inputs.switching

@@ -20,6 +20,7 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.errors import NetworkWarning, SimulationError
 from shaftwork.core.notices import hint, warn
+from shaftwork.formulation.sampling_instants import refuse_sampled
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import first_few
 from shaftwork.pipeline.prepared import Prepared
@@ -57,6 +58,7 @@ def steady_operation(prepared: Prepared, t: float, initial: Mapping[str, float])
     Raises:
         SimulationError: nothing comes to rest or to a steady speed.
     """
+    refuse_sampled(prepared.form, "there is no steady state of its equations")
     bound, switching, after_all = prepared.bound, prepared.model.switching, not math.isfinite(t)
     when = prepared.model.settled(prepared.p) if after_all else t
     start = initial_state(bound, initial, when)

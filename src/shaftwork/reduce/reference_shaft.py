@@ -12,6 +12,7 @@ from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import Diagnostic, NetworkError, ParameterError, SignalError
 from shaftwork.core.screen import in_columns
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphPart
+from shaftwork.network.measurements import refuse_measuring
 from shaftwork.network.netlist import REFERENCE, Netlist, Placed
 from shaftwork.pipeline.network import Network, network_of
 from shaftwork.reduce.kinematics import Kinematics, Scale, kinematics
@@ -156,6 +157,7 @@ def refer(net: Network, to: str, *, drives: Mapping[str, str] | None = None) -> 
     node = _checked_node(graph, to)
     ratios = kinematics(graph, sides)
     title = f"'{net.name}' cannot be referred to '{to}'"
+    refuse_measuring(netlist, title)
     if ratios.problems:
         raise NetworkError(title, ratios.problems)
     if node not in ratios.shafts:

@@ -17,6 +17,7 @@ from shaftwork.components.law_slopes import slope
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.errors import ParameterError, SimulationError
+from shaftwork.formulation.sampling_instants import refuse_sampled
 from shaftwork.numerics.tolerances import TYPED
 from shaftwork.pipeline.arguments import Given, Point, Time, by_name, relative_tolerance, time_span
 from shaftwork.pipeline.model import Model
@@ -64,6 +65,7 @@ def frequency_sensitivities(
         SimulationError: two modes have the same rate.
     """
     model = network_of(net).compile()
+    refuse_sampled(model.form, "it has no frequencies")
     equations, p, time, x, _ = model.point({}, at, t)
     names = smooth_parameters(model, _listed(parameters), (model, equations))
     rows = rows_of(equations)
@@ -143,6 +145,7 @@ def motion_sensitivities(
             prescribed speed jumps against an inertia, or two extremes are of one height.
     """
     read, names, model = _measures(measures), _listed(parameters), network_of(net).compile()
+    refuse_sampled(model.form, "its derivatives by parameters are not followed from instant to instant")
     refuse_motion(initial, "motion_sensitivities")
     span, tolerance = time_span(0.0, t_end), relative_tolerance(rtol)
     states = {state.name for state in model.form.states}

@@ -26,6 +26,7 @@ from shaftwork.equations.assembly import Assembly
 from shaftwork.equations.quantities import rate_of
 from shaftwork.equations.small_motions.point_slopes import exact, fraction
 from shaftwork.formulation.form import StateForm
+from shaftwork.formulation.sampling_instants import refuse_sampled
 from shaftwork.network.graph import GROUND, GraphBranch, GraphPart
 from shaftwork.network.kinds import Kind
 
@@ -54,6 +55,7 @@ def linear_form(equations: Equations, slopes: LawSlopes) -> StateForm:
         CompileError: a shaft is a travelling wave: no polynomials and matrices tell its motion.
     """
     form = equations.form
+    refuse_sampled(form, "it has no transfer functions")
     if form.waves:
         raise CompileError(
             f"Shaft '{form.graph.part_of(form.waves[0]).name}' is a travelling wave, whose transfer functions are no "
