@@ -142,7 +142,8 @@ class Switching:
         self._narrow = tuple(_narrow(form))
         self._unsolved = tuple(_unsolved(form))
         every = (*self._switches, *self._narrow, *self._unsolved)
-        self._places = sorted({place for one in every for place in one.places})
+        self.places = sorted({place for one in every for place in one.places})
+        """Of the parameters on which the instants depend."""
         self._timelines = BoundedCache[tuple[bytes, float, float, bool], Timeline](8)
 
     def known(self, p: Array) -> tuple[float, ...]:
@@ -188,7 +189,7 @@ class Switching:
         """
         if not self._switches and not self._narrow and not self._unsolved:
             return NOTHING
-        key = (p[self._places].tobytes(), t0, t_end, modes)
+        key = (p[self.places].tobytes(), t0, t_end, modes)
         return self._timelines(key, lambda: self._searched(p, t0, t_end, modes=modes))
 
     def _searched(self, p: Array, t0: float, t_end: float, *, modes: bool) -> Timeline:

@@ -124,10 +124,11 @@ class HybridModel(Model):
     def _motion(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
         first, p = self.equation_sets.first_equations(values)
         return in_its_size(
-            first.model.form, first.prepared(p), demand, lambda sized: self._run_through(values, initial, sized)
+            first.model.form, first.prepared(p), demand, lambda sized: self.run_once(values, initial, sized)
         )
 
-    def _run_through(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
+    def run_once(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
+        """See `Model.run_once`."""
         run = HybridRun(self.equation_sets, values, demand)
         run.march(initial)
         return solution(run, self.name)

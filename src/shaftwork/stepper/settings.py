@@ -1,0 +1,121 @@
+"""Inputs and parameters that are set while a motion is stepped: which there are, and in which model they are numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from shaftwork.components.base import Component
+from shaftwork.core.errors import ParameterError
+from shaftwork.network.netlist import Netlist, by_part, first_few
+from shaftwork.pipeline.arguments import Names, as_names, checked_parameters
+from shaftwork.pipeline.model import Model
+
+STANDING = 1.0
+"""What stands for an input where its model is made: its equations hold for all values, zero among them."""
+
+
+class Settings:
+    """The values that are set, and the model in which they are numbers.
+
+    An input is a value that may also be a law: what a source gives, "motor.tau". It holds its law until it is set. From
+    then on it is a parameter, in a model of its own in which a zero is a value like others.
+
+    Args:
+        model: of the network.
+        parameters: values that differ from the network's.
+        inputs: what will be set again and again; their model is compiled at once.
+
+    Raises:
+        ParameterError: there is no such input or parameter, or a value is not admissible.
+    """
+
+    def __init__(self, model: Model, parameters: Mapping[str, float] | None, inputs: Names) -> None:
+        self._base, self.values = model, dict[str, float]()
+        self._numbers = frozenset(_names(model.netlist, laws=False))
+        self.inputs = () if inputs is None else as_names(inputs)
+        for name in self.inputs:
+            if name not in _names(model.netlist, laws=True):
+                self._refuse(name)
+        self._replaced: tuple[str, ...] = ()
+        self.model, self.in_model = model, dict[str, float]()
+        """The model in which the values hold, and those that it takes as parameters: others are in its structure."""
+        for name, value in (parameters or {}).items():
+            self.set(name, value)
+        laws = dict.fromkeys(name for name in self.inputs if _is_law(model.netlist, name))
+        if laws and tuple(laws) != self._replaced:
+            _ = self._standing(tuple(dict.fromkeys((*self._replaced, *laws)))).states
+
+    def copy(self) -> Settings:
+        """The same settings, which go on by themselves."""
+        other = object.__new__(Settings)
+        vars(other).update(vars(self), values=dict(self.values))
+        return other
+
+    def restore(self, values: Mapping[str, float]) -> None:
+        """Go back to values that were set before."""
+        self.values, self._replaced = {}, ()
+        self.model, self.in_model = self._base, {}
+        for name, value in values.items():
+            self.set(name, value)
+
+    def set(self, name: str, value: Any) -> bool:
+        """Set an input or a parameter, and tell whether the model is the same as before.
+
+        Raises:
+            ParameterError: there is none of this name, or the value is not admissible.
+        """
+        is_law = _is_law(self._base.netlist, name)
+        if not is_law and name not in self._numbers:
+            self._refuse(name)
+        before, replaced = self.model, self._replaced
+        if is_law and name not in replaced:
+            replaced = (*replaced, name)
+        netlist = self._standing(replaced).netlist
+        same_part = {key: held for key, held in self.values.items() if key.rpartition(".")[0] == name.rpartition(".")[0]}
+        self.values[name] = checked_parameters(netlist, {**same_part, name: value})[name]
+        self._replaced = replaced
+        self.model, self.in_model = self._model_and_values()
+        return self.model is before
+
+    def takes_at_once(self, name: str) -> bool:
+        """Whether a value is that of a law: it changes no store and no structure."""
+        return name in self._replaced
+
+    def _model_and_values(self) -> tuple[Model, dict[str, float]]:
+        model = self._standing(self._replaced)
+        zeros = {name: self.values[name] or STANDING for name in self._replaced}
+        if not model.changes_structure({**self.values, **zeros}):
+            return model, self.values
+        others = {name: value for name, value in self.values.items() if name not in self._replaced}
+        return model.variant(others), {name: self.values[name] for name in self._replaced}
+
+    def _standing(self, replaced: tuple[str, ...]) -> Model:
+        return self._base.variant(dict.fromkeys(replaced, STANDING)) if replaced else self._base
+
+    def _refuse(self, name: Any) -> None:
+        names, title = _names(self._base.netlist, laws=True), self._base.name
+        of_part = [other for other in names if other.rpartition(".")[0] == str(name).rpartition(".")[0]]
+        there = f"There are: {first_few(of_part or [*names], 12)}." if names else "It has none."
+        raise ParameterError(f"'{title}' has no input or parameter {name!r}. {there}")
+
+
+def _names(netlist: Netlist, *, laws: bool) -> dict[str, None]:
+    """The values that were given as numbers, and the laws where these count too, as "part.parameter"."""
+    pairs = ((placed.part, key) for placed in netlist.placed for key in placed.part.declared)
+    return {f"{part.name}.{key}": None for part, key in pairs if _is_number(part, key) or (laws and _law(part, key))}
+
+
+def _is_number(part: Component, key: str) -> bool:
+    return isinstance(part.declared[key].magnitude(part.values[key])[0], float)
+
+
+def _law(part: Component, key: str) -> bool:
+    return part.declared[key].law and part.values[key] is not None
+
+
+def _is_law(netlist: Netlist, name: str) -> bool:
+    owner, _, key = str(name).rpartition(".")
+    return any(
+        placed.part.name == owner and key in placed.part.declared and _law(placed.part, key) for placed in netlist.placed
+    )
