@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ from shaftwork.formulation.form import Names
 from shaftwork.formulation.observables import Observables
 from shaftwork.integrate.engines import available
 from shaftwork.integrate.problem import Problem
+from shaftwork.network.kinds import Kind
 from shaftwork.pipeline.arguments import Demand, Given
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import Ending
@@ -29,6 +31,10 @@ from shaftwork.results.observer import Reader
 
 BESIDE = 1e-9
 """Seconds after an instant at which a quantity is read that has no value in it, as 0/0."""
+
+
+TORQUES = (Kind.LAW, Kind.THROUGH_SOURCE)
+"""Kinds of branches in which new numbers change rates alone."""
 
 
 class Readings:
@@ -45,6 +51,26 @@ class Readings:
         self.names = Names(model.form)
         self._places = {name: place for place, name in enumerate(model.states)}
         self._functions: dict[str, Callable[..., list[float]] | None] = {}
+
+    @cached_property
+    def in_laws(self) -> dict[str, int]:
+        """The parameters that stand in torques alone, and their places: no speed changes at once where they do.
+
+        Neither are they in the instants at which laws jump, nor in what tells in which mode a part starts.
+        """
+        form, places = self.model.form, {name: place for place, name in enumerate(self.model.parameters)}
+        if form.dependent_across or form.dependent_through:
+            return {}
+        bound = {[*places][place] for place in self.model.switching.places}
+        for part in form.graph.parts:
+            templates = [form.graph.branches[k].template for k in part.branches]
+            symbols = [s for one in templates if one.kind not in TORQUES for s in one.symbols]
+            for element in part.modes:
+                for mode in element.options:
+                    leaves = (leave.when for leave in mode.leaves if leave.rebound is not None)
+                    symbols += [s for one in (mode.starts, *leaves) for s in one.free_symbols]
+            bound |= {f"{part.name}.{name}" for name in (*map(str, symbols), *part.consulted)}
+        return {name: place for name, place in places.items() if name not in bound}
 
     def at(self, name: str, t: float, x: list[float], p: list[float]) -> float:
         """A quantity at a time in s; not a number where there is no function of it."""
@@ -128,11 +154,8 @@ class Moment:
 
     def held(self, name: str, value: float) -> bool:
         """Give an input another value; False where that changes more than rates, and nothing has changed."""
-        form, places = self.model.form, [*self.model.parameters]
-        if self.steps is None or name not in places or form.dependent_across or form.dependent_through:
-            return False
-        place = places.index(name)
-        if place in self.model.switching.places:
+        place = self.readings.in_laws.get(name)
+        if self.steps is None or place is None:
             return False
         vector = self.vector.copy()
         vector[place] = value

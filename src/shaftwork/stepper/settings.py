@@ -32,17 +32,18 @@ class Settings:
 
     def __init__(self, model: Model, parameters: Mapping[str, float] | None, inputs: Names) -> None:
         self._base, self.values = model, dict[str, float]()
-        self._numbers = frozenset(_names(model.netlist, laws=False))
+        self._numbers = _names(model.netlist, laws=False)
+        self._laws = {name: None for name in _names(model.netlist, laws=True) if _is_law(model.netlist, name)}
         self.inputs = () if inputs is None else as_names(inputs)
         for name in self.inputs:
-            if name not in _names(model.netlist, laws=True):
+            if name not in self._laws and name not in self._numbers:
                 self._refuse(name)
         self._replaced: tuple[str, ...] = ()
         self.model, self.in_model = model, dict[str, float]()
         """The model in which the values hold, and those that it takes as parameters: others are in its structure."""
         for name, value in (parameters or {}).items():
             self.set(name, value)
-        laws = dict.fromkeys(name for name in self.inputs if _is_law(model.netlist, name))
+        laws = dict.fromkeys(name for name in self.inputs if name in self._laws)
         if laws and tuple(laws) != self._replaced:
             _ = self._standing(tuple(dict.fromkeys((*self._replaced, *laws)))).states
 
@@ -65,11 +66,10 @@ class Settings:
         Raises:
             ParameterError: there is none of this name, or the value is not admissible.
         """
-        is_law = _is_law(self._base.netlist, name)
-        if not is_law and name not in self._numbers:
+        if name not in self._laws and name not in self._numbers:
             self._refuse(name)
         before, replaced = self.model, self._replaced
-        if is_law and name not in replaced:
+        if name in self._laws and name not in replaced:
             replaced = (*replaced, name)
         netlist = self._standing(replaced).netlist
         same_part = {key: held for key, held in self.values.items() if key.rpartition(".")[0] == name.rpartition(".")[0]}
@@ -77,10 +77,6 @@ class Settings:
         self._replaced = replaced
         self.model, self.in_model = self._model_and_values()
         return self.model is before
-
-    def takes_at_once(self, name: str) -> bool:
-        """Whether a value is that of a law: it changes no store and no structure."""
-        return name in self._replaced
 
     def _model_and_values(self) -> tuple[Model, dict[str, float]]:
         model = self._standing(self._replaced)

@@ -146,14 +146,11 @@ class Simulation:
         """
         self._refuse_failed()
         moment, settings = self._moment, self._settings
-        if moment is not None and not settings.takes_at_once(name):
-            self._leave(moment)
-            moment = None
         same = settings.set(name, value)
-        if moment is None or (same and moment.held(name, settings.values[name])):
-            self._moved = self._moved or moment is not None
-            return
-        self._leave(moment)
+        if moment is not None and same and moment.held(name, settings.values[name]):
+            self._moved = True
+        else:
+            self._leave(moment)
 
     def step(self, dt: float) -> None:
         """Go on by a time.

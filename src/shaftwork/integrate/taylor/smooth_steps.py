@@ -13,7 +13,7 @@ import numpy as np
 from shaftwork.integrate.problem import Array, Problem
 from shaftwork.integrate.smooth_intervals import pieces
 from shaftwork.integrate.taylor.heyoka_run import TaylorRun
-from shaftwork.integrate.taylor.heyoka_switches import keeps_sides
+from shaftwork.integrate.taylor.heyoka_switches import SOMEWHERE, keeps_sides
 from shaftwork.integrate.taylor.heyoka_taylor import tolerance
 
 MOST = 100
@@ -50,6 +50,8 @@ class SmoothSteps:
 
     def __init__(self, problem: Problem, at: Snapshot | None = None) -> None:
         self._program, self._tolerance, self._atol = problem.program.program, tolerance(problem), problem.atol
+        with self._program.lent(self._tolerance) as lent:
+            self._orders = np.arange(lent.integrator.order + 1.0)
         self.at = self._beginning(problem) if at is None else at
 
     @staticmethod
@@ -65,20 +67,18 @@ class SmoothSteps:
 
     def step(self, end: float) -> bool:
         """Go on to a time in s; False where something happens on the way, and nothing has been done."""
-        t, x, parameters, last = self.at
+        t, _, parameters, last = self.at
         if end >= last:
             return False
         with self._program.lent(self._tolerance) as lent:
             integrator = lent.integrator
-            integrator.time, integrator.state[:], integrator.pars[:] = t, x, parameters
-            if integrator.with_events:
-                integrator.reset_cooldowns()
+            self._load(integrator, self.at)
             for number in range(MOST):
                 start = integrator.time
                 outcome, length = integrator.step(end - start, write_tc=number == 0)
                 if int(outcome) > -(2**32) or not length > 0.0:  # an event, or it stands still
                     return False
-                if number == 0 and not self._is_first_good(integrator, start):
+                if number == 0 and (end - t > MOST * length or not self._is_first_good(integrator, start)):
                     return False
                 if outcome.name == "time_limit":
                     break
@@ -93,24 +93,37 @@ class SmoothSteps:
     def with_parameters(self, p: Array) -> bool:
         """Go on with other parameters (p,) of the model; False where that changes more than they, and nothing has."""
         program, at = self._program, self.at
-        if program.held is not None or program.fading:
-            return False
         parameters, values = at.parameters.copy(), program.bind(p).parameters
+        if program.held is not None:
+            first = program.held.first
+            values[first:] = at.parameters[first : program.parameter_count]
+            program.held.start(at.t, at.t + SOMEWHERE * (at.end - at.t), at.x, values)
+            if not np.array_equal(values[first:], at.parameters[first : program.parameter_count]):
+                return False
         used = min(parameters.size, values.size)  # heyoka keeps none behind the last one that the rows contain
         parameters[:used] = values[:used]
         new = at._replace(parameters=parameters)
         if not self._is_clear(new):
             return False
+        if program.fading:
+            with program.lent(self._tolerance) as lent:
+                self._load(lent.integrator, new)
+                program.weigh(lent.integrator)
+                new = new._replace(parameters=lent.integrator.pars.copy())
         self.at = new
         return True
+
+    @staticmethod
+    def _load(integrator: Any, at: Snapshot) -> None:
+        integrator.time, integrator.state[:], integrator.pars[:] = at.t, at.x, at.parameters
+        if integrator.with_events:
+            integrator.reset_cooldowns()
 
     def _is_first_good(self, integrator: Any, start: float) -> bool:
         """Whether the first series satisfies the equations; heyoka may take it for a polynomial that it is not."""
         elapsed = INSIDE * (integrator.time - start)
-        terms = integrator.tc
-        orders = np.arange(terms.shape[1])
-        powers = elapsed**orders
-        state, change = terms @ powers, terms @ (orders * powers)
+        powers = elapsed**self._orders
+        state, change = np.dot(integrator.tc, np.array((powers, self._orders * powers)).T).T
         slopes = self._program.slopes(start + elapsed, state, integrator.pars)
         defect = np.abs(elapsed * slopes - change)
         if not (defect <= DEFECT * (np.abs(state) + np.abs(change)) + self._atol).all():
@@ -122,10 +135,10 @@ class SmoothSteps:
         program, (t, x, parameters, _) = self._program, at
         if program.guards:
             sides, offsets = parameters[program.sides], parameters[program.offsets]
-            values = sides * program.guard_values(t, x, parameters)
-            if not (values[sides != 0.0] < -offsets[sides != 0.0]).all():
+            beyond = sides * program.guard_values(t, x, parameters) + offsets
+            if not ((beyond < 0.0) | (sides == 0.0)).all():
                 return False
         if program.all_timed:
             return True
         signs = parameters[program.signs] * program.switch_values(t, x, parameters)
-        return bool((signs[~program.timed] > 0.0).all())
+        return bool(((signs > 0.0) | program.timed).all())
