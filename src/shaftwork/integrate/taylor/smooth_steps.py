@@ -32,12 +32,14 @@ class Snapshot(NamedTuple):
         x: (n,) state.
         parameters: (p,) all of the program: signs of conditions and sides of guards are among them.
         end: where they end at the latest, s.
+        begins: whether the motion begins here, or with other parameters: then its first series is looked at.
     """
 
     t: float
     x: Array
     parameters: Array
     end: float
+    begins: bool
 
 
 class SmoothSteps:
@@ -63,11 +65,11 @@ class SmoothSteps:
         piece = pieces(problem)[0]
         with self._program.lent(self._tolerance) as lent:
             TaylorRun(problem, lent).begin(piece)
-            return Snapshot(piece.start, lent.integrator.state.copy(), lent.integrator.pars.copy(), piece.end)
+            return Snapshot(piece.start, lent.integrator.state.copy(), lent.integrator.pars.copy(), piece.end, begins=True)
 
     def step(self, end: float) -> bool:
         """Go on to a time in s; False where something happens on the way, and nothing has been done."""
-        t, _, parameters, last = self.at
+        t, _, parameters, last, begins = self.at
         if end >= last:
             return False
         with self._program.lent(self._tolerance) as lent:
@@ -75,16 +77,19 @@ class SmoothSteps:
             self._load(integrator, self.at)
             for number in range(MOST):
                 start = integrator.time
-                outcome, length = integrator.step(end - start, write_tc=number == 0)
+                outcome, length = integrator.step(end - start, write_tc=begins)
                 if int(outcome) > -(2**32) or not length > 0.0:  # an event, or it stands still
                     return False
-                if number == 0 and (end - t > MOST * length or not self._is_first_good(integrator, start)):
+                if number == 0 and end - start > MOST * length:
                     return False
+                if begins and not self._is_first_good(integrator, start):
+                    return False
+                begins = False
                 if outcome.name == "time_limit":
                     break
             else:
                 return False
-            after = Snapshot(end, integrator.state.copy(), parameters, last)
+            after = Snapshot(end, integrator.state.copy(), parameters, last, begins=False)
         if not np.isfinite(after.x).all() or not self._is_clear(after):
             return False
         self.at = after
@@ -102,7 +107,7 @@ class SmoothSteps:
                 return False
         used = min(parameters.size, values.size)  # heyoka keeps none behind the last one that the rows contain
         parameters[:used] = values[:used]
-        new = at._replace(parameters=parameters)
+        new = at._replace(parameters=parameters, begins=True)
         if not self._is_clear(new):
             return False
         if program.fading:
@@ -123,7 +128,7 @@ class SmoothSteps:
         """Whether the first series satisfies the equations; heyoka may take it for a polynomial that it is not."""
         elapsed = INSIDE * (integrator.time - start)
         powers = elapsed**self._orders
-        state, change = np.dot(integrator.tc, np.array((powers, self._orders * powers)).T).T
+        state, change = np.array((powers, self._orders * powers)) @ integrator.tc.T
         slopes = self._program.slopes(start + elapsed, state, integrator.pars)
         defect = np.abs(elapsed * slopes - change)
         if not (defect <= DEFECT * (np.abs(state) + np.abs(change)) + self._atol).all():
@@ -132,7 +137,7 @@ class SmoothSteps:
 
     def _is_clear(self, at: Snapshot) -> bool:
         """Whether all guards are within their limits and all conditions on the sides that their signs say."""
-        program, (t, x, parameters, _) = self._program, at
+        program, (t, x, parameters, *_) = self._program, at
         if program.guards:
             sides, offsets = parameters[program.sides], parameters[program.offsets]
             beyond = sides * program.guard_values(t, x, parameters) + offsets
