@@ -17,10 +17,14 @@ from shaftwork.stepper.moments import Moment, Place, Readings, smooth_steps
 
 
 def hybrid_moment(
-    model: HybridModel, values: Mapping[str, float], origin: Given | Place, demand: Demand, cached: dict[Any, Readings]
+    model: HybridModel,
+    values: Mapping[str, float],
+    origin: Given,
+    demand: Demand,
+    cached: dict[Any, Readings],
+    place: Place | None = None,
 ) -> Moment:
     """The network at the start of a span, in the modes that go on; arguments as of `plain_moment`."""
-    place = origin if isinstance(origin, Place) else None
     run = HybridRun(model.equation_sets, values, demand)
     if place is None:
         state = run.begin(origin)

@@ -152,7 +152,7 @@ class Moment:
         self._lists = None
         return True
 
-    def held(self, name: str, value: float) -> bool:
+    def set(self, name: str, value: float) -> bool:
         """Give an input another value; False where that changes more than rates, and nothing has changed."""
         place = self.readings.in_laws.get(name)
         if self.steps is None or place is None:
@@ -191,11 +191,13 @@ class Moment:
             stored = self.stored(self._bound, self.after, self.x)
             if isinstance(name, str) and name in stored:
                 return stored[name]
-        Reader(self.model.form.graph.name, tuple(self.model.states), observer, _NoMotion()).unit(name)
+        motion = _NoMotion()
+        Reader(self.model.form.graph.name, tuple(self.model.states), observer, motion).unit(name)
 
         def read(t: float, x: Array) -> Any:
             at = np.array([t]), x[None, :]
-            return (observer.profile if name in observer.profiles else observer.signal)(name, *at, None)[0]  # type: ignore[operator]
+            read_of = observer.profile if name in observer.profiles else observer.signal
+            return read_of(name, *at, motion)[0]
 
         with np.errstate(all="ignore"):
             value = read(self.after, self.x)
@@ -220,23 +222,25 @@ class _NoMotion:
 
 
 def plain_moment(
-    model: Model, values: Mapping[str, float], origin: Given | Place, demand: Demand, cached: dict[Any, Readings]
+    model: Model,
+    values: Mapping[str, float],
+    origin: Given,
+    demand: Demand,
+    cached: dict[Any, Readings],
+    place: Place | None = None,
 ) -> Moment:
     """The network at the start of a span, where no part changes its mode.
 
     Args:
         model: the equations.
         values: parameters that differ from the model's.
-        origin: start values, or where the motion before ended; or a `Place`, to come back to it.
+        origin: start values, or where the motion before ended.
         demand: what is asked of the motion from here on.
         cached: readings by what they are of.
+        place: in place of the origin, to come back to it.
     """
-    place = origin if isinstance(origin, Place) else None
     prepared, form = model.prepare(model.vector(values) if place is None else place.vector), model.form
-    if place is None:
-        x = model.state_at_start(prepared, origin, demand.span)[0]
-    else:
-        x = place.snapshot.x
+    x = model.state_at_start(prepared, origin, demand.span)[0] if place is None else place.snapshot.x
     if model not in cached:
         rows = model.rows
         cached[model] = Readings(model, rows, None if rows is None else Observables(form, rows))

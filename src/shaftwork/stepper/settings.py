@@ -1,13 +1,13 @@
-"""Inputs and parameters that are set while a motion is stepped: which there are, and in which model they are numbers."""
+"""Inputs and parameters that are set while a motion is stepped, and the model in which they are numbers."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from shaftwork.components.base import Component
 from shaftwork.core.errors import ParameterError
-from shaftwork.network.netlist import Netlist, by_part, first_few
+from shaftwork.network.netlist import Netlist, first_few
 from shaftwork.pipeline.arguments import Names, as_names, checked_parameters
 from shaftwork.pipeline.model import Model
 
@@ -47,12 +47,6 @@ class Settings:
         if laws and tuple(laws) != self._replaced:
             _ = self._standing(tuple(dict.fromkeys((*self._replaced, *laws)))).states
 
-    def copy(self) -> Settings:
-        """The same settings, which go on by themselves."""
-        other = object.__new__(Settings)
-        vars(other).update(vars(self), values=dict(self.values))
-        return other
-
     def restore(self, values: Mapping[str, float]) -> None:
         """Go back to values that were set before."""
         self.values, self._replaced = {}, ()
@@ -66,25 +60,26 @@ class Settings:
         Raises:
             ParameterError: there is none of this name, or the value is not admissible.
         """
-        if name not in self._laws and name not in self._numbers:
+        if not isinstance(name, str) or (name not in self._laws and name not in self._numbers):
             self._refuse(name)
         before, replaced = self.model, self._replaced
         if name in self._laws and name not in replaced:
             replaced = (*replaced, name)
         netlist = self._standing(replaced).netlist
-        same_part = {key: held for key, held in self.values.items() if key.rpartition(".")[0] == name.rpartition(".")[0]}
-        self.values[name] = checked_parameters(netlist, {**same_part, name: value})[name]
-        self._replaced = replaced
-        self.model, self.in_model = self._model_and_values()
+        part = name.rpartition(".")[0]
+        of_part = {other: number for other, number in self.values.items() if other.rpartition(".")[0] == part}
+        values = {**self.values, name: checked_parameters(netlist, {**of_part, name: value})[name]}
+        self.model, self.in_model = self._model_of(values, replaced)
+        self.values, self._replaced = values, replaced
         return self.model is before
 
-    def _model_and_values(self) -> tuple[Model, dict[str, float]]:
-        model = self._standing(self._replaced)
-        zeros = {name: self.values[name] or STANDING for name in self._replaced}
-        if not model.changes_structure({**self.values, **zeros}):
-            return model, self.values
-        others = {name: value for name, value in self.values.items() if name not in self._replaced}
-        return model.variant(others), {name: self.values[name] for name in self._replaced}
+    def _model_of(self, values: dict[str, float], replaced: tuple[str, ...]) -> tuple[Model, dict[str, float]]:
+        """The model in which values hold, and those that it takes as parameters."""
+        model = self._standing(replaced)
+        if not model.changes_structure({**values, **{name: values[name] or STANDING for name in replaced}}):
+            return model, values
+        others = {name: value for name, value in values.items() if name not in replaced}
+        return model.variant(others), {name: values[name] for name in replaced}
 
     def _standing(self, replaced: tuple[str, ...]) -> Model:
         return self._base.variant(dict.fromkeys(replaced, STANDING)) if replaced else self._base
@@ -112,6 +107,5 @@ def _law(part: Component, key: str) -> bool:
 
 def _is_law(netlist: Netlist, name: str) -> bool:
     owner, _, key = str(name).rpartition(".")
-    return any(
-        placed.part.name == owner and key in placed.part.declared and _law(placed.part, key) for placed in netlist.placed
-    )
+    parts = (placed.part for placed in netlist.placed if placed.part.name == owner)
+    return any(key in part.declared and _law(part, key) for part in parts)

@@ -35,7 +35,8 @@ class SavedState:
         values: of inputs and parameters that were set.
         origin: start values, or where the motion had come to when something last happened.
         place: where it has come to since, or None.
-        clock: time in s and number of equal steps since, and their length in s.
+        clock: time in s, number of equal steps since, and their length in s.
+        ahead: time in s for which the next moment is prepared.
         engine: that goes on, or "".
     """
 
@@ -46,6 +47,7 @@ class SavedState:
     origin: Given
     place: Place | None
     clock: tuple[float, int, float]
+    ahead: float
     engine: str
 
 
@@ -83,7 +85,7 @@ class Simulation:
             check(engine)
         if parameters is not None and not isinstance(parameters, Mapping):
             raise ParameterError(f"parameters = {parameters!r} must map names to values, such as {{'shaft.c': 3e4}}.")
-        self._asked = Demand((0.0, 1.0), relative_tolerance(rtol), atol, None, engine, MOST_STEPS, None)
+        self._options = Demand((0.0, 1.0), relative_tolerance(rtol), atol, None, engine, MOST_STEPS, None)
         self._settings = Settings(model, parameters, inputs)
         self._cached: dict[Any, Readings] = {}
         started: Any = ending_of(initial, model.form.graph) if isinstance(initial, Solution) else initial
@@ -147,9 +149,8 @@ class Simulation:
         self._refuse_failed()
         moment, settings = self._moment, self._settings
         same = settings.set(name, value)
-        if moment is not None and same and moment.held(name, settings.values[name]):
-            self._moved = True
-        else:
+        # one that is only looked at is left, so that looking changes no bit of what follows
+        if not (self._moved and same and moment is not None and moment.set(name, settings.values[name])):
             self._leave(moment)
 
     def step(self, dt: float) -> None:
@@ -183,9 +184,7 @@ class Simulation:
         """All that the motion goes on with from here: to come back with `restore`, to the last bit; it pickles."""
         place = self._moment.place if self._moved and self._moment is not None else None
         values = dict(self._settings.values)
-        return SavedState(
-            self._name, self._wiring, self._t, values, self._origin, place, self._clock, self._engine
-        )
+        return SavedState(self._name, self._wiring, self._t, values, self._origin, place, self._clock, self._ahead, self._engine)
 
     def restore(self, state: SavedState) -> None:
         """Go on from a state that was saved, of this motion or of another one of the same network.
@@ -202,37 +201,37 @@ class Simulation:
             )
         self._settings.restore(state.values)
         self._t, self._origin, self._clock, self._engine = state.t, state.origin, state.clock, state.engine
-        self._motion, self._failed, self._moment, self._moved = None, "", None, False
+        self._ahead, self._motion, self._failed, self._moment, self._moved = state.ahead, None, "", None, False
         if state.place is not None:
-            self._moment, self._moved = self._moment_at(state.place, state.place.span), True
+            self._moment, self._moved = self._moment_at(state.place.span, state.place), True
 
     def _refuse_failed(self) -> None:
         if self._failed:
             raise SimulationError(
-                f"The motion has failed before and stands at t = {self._t:.9g} s: {self._failed} Restore a state that was "
-                "saved, or start anew."
+                f"The motion has failed before and stands at t = {self._t:.9g} s: {self._failed} Restore a state that "
+                "was saved, or start anew."
             )
 
     @property
     def _now(self) -> Moment:
         """The network at this instant, with what is set."""
         if self._moment is None:
-            self._moment = self._moment_at(self._origin, (self._t, self._t + self._ahead))
+            self._moment = self._moment_at((self._t, self._t + self._ahead))
             self._moved = False
         return self._moment
 
-    def _moment_at(self, origin: Given | Place, span: tuple[float, float]) -> Moment:
+    def _moment_at(self, span: tuple[float, float], place: Place | None = None) -> Moment:
         model, values = self._settings.model, self._settings.in_model
-        demand = self._demand(span)
+        further = self._origin, self._demand(span), self._cached, place
         if model.phased:
             from shaftwork.stepper.hybrid_moments import hybrid_moment
 
-            return hybrid_moment(model, values, origin, demand, self._cached)  # type: ignore[arg-type]
-        return plain_moment(model, values, origin, demand, self._cached)
+            return hybrid_moment(model, values, *further)  # type: ignore[arg-type]
+        return plain_moment(model, values, *further)
 
     def _demand(self, span: tuple[float, float], engine: str = "") -> Demand:
-        asked = self._asked
-        return Demand(span, asked.rtol, asked.atol, np.array([span[1]]), engine or asked.engine, MOST_STEPS, None)
+        options = self._options
+        return Demand(span, options.rtol, options.atol, np.array([span[1]]), engine or options.engine, MOST_STEPS, None)
 
     def _leave(self, moment: Moment | None) -> None:
         """Forget what was prepared for this instant, and keep what goes on from it."""
@@ -255,9 +254,9 @@ class Simulation:
         try:
             motion = model.run_once(values, self._origin, self._demand(span, self._engine))
         except SimulationError:
-            if not self._engine or self._asked.engine != "auto":
+            if not self._engine or self._options.engine != "auto":
                 raise
             motion = model.run_once(values, self._origin, self._demand(span))
-        if self._asked.engine == "auto" and not model.phased and not model.form.waves and model.states:
+        if self._options.engine == "auto" and not model.phased and not model.form.waves and model.states:
             self._engine = motion.engine  # to choose anew takes longer than many a step
         self._origin, self._motion = handed_over(motion, {**model.parameters, **values}), motion

@@ -65,11 +65,13 @@ class SmoothSteps:
         piece = pieces(problem)[0]
         with self._program.lent(self._tolerance) as lent:
             TaylorRun(problem, lent).begin(piece)
-            return Snapshot(piece.start, lent.integrator.state.copy(), lent.integrator.pars.copy(), piece.end, begins=True)
+            return Snapshot(
+                piece.start, lent.integrator.state.copy(), lent.integrator.pars.copy(), piece.end, begins=True
+            )
 
     def step(self, end: float) -> bool:
         """Go on to a time in s; False where something happens on the way, and nothing has been done."""
-        t, _, parameters, last, begins = self.at
+        _, _, parameters, last, begins = self.at
         if end >= last:
             return False
         with self._program.lent(self._tolerance) as lent:
