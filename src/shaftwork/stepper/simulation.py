@@ -184,7 +184,9 @@ class Simulation:
         """All that the motion goes on with from here: to come back with `restore`, to the last bit; it pickles."""
         place = self._moment.place if self._moved and self._moment is not None else None
         values = dict(self._settings.values)
-        return SavedState(self._name, self._wiring, self._t, values, self._origin, place, self._clock, self._ahead, self._engine)
+        return SavedState(
+            self._name, self._wiring, self._t, values, self._origin, place, self._clock, self._ahead, self._engine
+        )
 
     def restore(self, state: SavedState) -> None:
         """Go on from a state that was saved, of this motion or of another one of the same network.
