@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
-from shaftwork.hybrid.hybrid_model import HybridModel
 from shaftwork.hybrid.hybrid_run import HybridRun, tightened_for
 from shaftwork.hybrid.hybrid_state import HybridState
 from shaftwork.pipeline.arguments import Demand, Given
-from shaftwork.stepper.moments import Moment, Place, Readings, smooth_steps
+from shaftwork.stepper.moments import Moment, MomentState, Observations, smooth_steps
+
+if TYPE_CHECKING:
+    from shaftwork.hybrid.hybrid_model import HybridModel
 
 
 def hybrid_moment(
@@ -21,8 +23,8 @@ def hybrid_moment(
     values: Mapping[str, float],
     origin: Given,
     demand: Demand,
-    cached: dict[Any, Readings],
-    place: Place | None = None,
+    cached: dict[Any, Observations],
+    place: MomentState | None = None,
 ) -> Moment:
     """The network at the start of a span, in the modes that go on; arguments as of `plain_moment`."""
     run = HybridRun(model.equation_sets, values, demand)
@@ -34,7 +36,7 @@ def hybrid_moment(
     regime, equations = state.regime, state.regime.equations
     t = demand.span[0] if place is None else place.snapshot.t
     if equations.readings not in cached:
-        cached[equations.readings] = Readings(regime.model, equations.rows, equations.readings)
+        cached[equations.readings] = Observations(regime.model, equations.rows, equations.readings)
 
     def stored(bind: Any, at: float, x: Array) -> Mapping[str, float]:
         numbers = regime.stores.of(bind, np.array([at]), x[None, :])[0]

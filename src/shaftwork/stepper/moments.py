@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -25,9 +25,11 @@ from shaftwork.integrate.engines import available
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.kinds import Kind
 from shaftwork.pipeline.arguments import Demand, Given
-from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import Ending
 from shaftwork.results.observer import Reader
+
+if TYPE_CHECKING:
+    from shaftwork.pipeline.model import Model
 
 BESIDE = 1e-9
 """Seconds after an instant at which a quantity is read that has no value in it, as 0/0."""
@@ -37,7 +39,7 @@ TORQUES = (Kind.LAW, Kind.THROUGH_SOURCE)
 """Kinds of branches in which new numbers change rates alone."""
 
 
-class Readings:
+class Observations:
     """What the parts show in one set of equations, as functions of time, states and parameters.
 
     Args:
@@ -92,7 +94,7 @@ class Readings:
         return scalar({"t": TIME, "x": rows.states, "p": rows.parameters}, [expression])
 
 
-class Place(NamedTuple):
+class MomentState(NamedTuple):
     """Where a moment is, as numbers and names that can be stored.
 
     Args:
@@ -128,7 +130,7 @@ class Moment:
     """
 
     model: CompiledModel
-    readings: Readings
+    readings: Observations
     demand: Demand
     t: float
     after: float
@@ -170,9 +172,9 @@ class Moment:
         return Ending(stored, self.t, self.after, self.modes, self.parameters, None)
 
     @property
-    def place(self) -> Place:
+    def place(self) -> MomentState:
         """Where it is."""
-        return Place(self.demand.span, tuple(self.modes.values()), self.steps.at, self.vector)
+        return MomentState(self.demand.span, tuple(self.modes.values()), self.steps.at, self.vector)
 
     def _bound(self) -> BoundArrays:
         return self.bind(self.vector[: len(self.model.parameters)])
@@ -206,8 +208,8 @@ class Moment:
                 value = read(self.after + BESIDE, self.x + BESIDE * rates)
         if not np.isfinite(value).all():
             raise SimulationError(
-                f"'{name}' of '{self.model.form.graph.name}' has no finite value at t = {self.t:.9g} s: its law divides "
-                "by zero there. Read what it is made of, or give the law a finite value."
+                f"'{name}' of '{self.model.form.graph.name}' has no finite value at t = {self.t:.9g} s: its law "
+                "divides by zero there. Read what it is made of, or give the law a finite value."
             )
         return value if np.ndim(value) else float(value)
 
@@ -226,8 +228,8 @@ def plain_moment(
     values: Mapping[str, float],
     origin: Given,
     demand: Demand,
-    cached: dict[Any, Readings],
-    place: Place | None = None,
+    cached: dict[Any, Observations],
+    place: MomentState | None = None,
 ) -> Moment:
     """The network at the start of a span, where no part changes its mode.
 
@@ -243,7 +245,7 @@ def plain_moment(
     x = model.state_at_start(prepared, origin, demand.span)[0] if place is None else place.snapshot.x
     if model not in cached:
         rows = model.rows
-        cached[model] = Readings(model, rows, None if rows is None else Observables(form, rows))
+        cached[model] = Observations(model, rows, None if rows is None else Observables(form, rows))
     t = demand.span[0] if place is None else place.snapshot.t
     return Moment(
         model=model,
@@ -260,7 +262,7 @@ def plain_moment(
     )
 
 
-def smooth_steps(model: CompiledModel, problem: Problem, demand: Demand, place: Place | None) -> Any:
+def smooth_steps(model: CompiledModel, problem: Problem, demand: Demand, place: MomentState | None) -> Any:
     """What goes on from a problem while nothing happens; None where nothing does.
 
     Args:

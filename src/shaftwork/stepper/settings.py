@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from shaftwork.components.base import Component
 from shaftwork.core.errors import ParameterError
 from shaftwork.network.netlist import Netlist, first_few
 from shaftwork.pipeline.arguments import Names, as_names, checked_parameters
-from shaftwork.pipeline.model import Model
+
+if TYPE_CHECKING:
+    from shaftwork.pipeline.model import Model
 
 STANDING = 1.0
 """What stands for an input where its model is made: its equations hold for all values, zero among them."""

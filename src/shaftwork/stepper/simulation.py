@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,11 +12,13 @@ from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationErro
 from shaftwork.core.parameters import in_si
 from shaftwork.integrate.choice import check
 from shaftwork.pipeline.arguments import Demand, Given, Names, relative_tolerance
-from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import ending_of, handed_over, time_of_start
 from shaftwork.results.solution import Solution
-from shaftwork.stepper.moments import Moment, Place, Readings, plain_moment
+from shaftwork.stepper.moments import Moment, MomentState, Observations, plain_moment
 from shaftwork.stepper.settings import Settings
+
+if TYPE_CHECKING:
+    from shaftwork.pipeline.model import Model
 
 AHEAD = 128
 """Steps for which the instants are looked up at which inputs jump."""
@@ -45,7 +47,7 @@ class SavedState:
     t: float
     values: Mapping[str, float]
     origin: Given
-    place: Place | None
+    place: MomentState | None
     clock: tuple[float, int, float]
     ahead: float
     engine: str
@@ -87,7 +89,7 @@ class Simulation:
             raise ParameterError(f"parameters = {parameters!r} must map names to values, such as {{'shaft.c': 3e4}}.")
         self._options = Demand((0.0, 1.0), relative_tolerance(rtol), atol, None, engine, MOST_STEPS, None)
         self._settings = Settings(model, parameters, inputs)
-        self._cached: dict[Any, Readings] = {}
+        self._cached: dict[Any, Observations] = {}
         started: Any = ending_of(initial, model.form.graph) if isinstance(initial, Solution) else initial
         self._wiring, self._name = model.form.graph.wiring, model.name
         self._origin: Given = dict(started) if type(started) is dict else started
@@ -222,14 +224,11 @@ class Simulation:
             self._moved = False
         return self._moment
 
-    def _moment_at(self, span: tuple[float, float], place: Place | None = None) -> Moment:
-        model, values = self._settings.model, self._settings.in_model
-        further = self._origin, self._demand(span), self._cached, place
-        if model.phased:
-            from shaftwork.stepper.hybrid_moments import hybrid_moment
-
-            return hybrid_moment(model, values, *further)  # type: ignore[arg-type]
-        return plain_moment(model, values, *further)
+    def _moment_at(self, span: tuple[float, float], place: MomentState | None = None) -> Moment:
+        model: Any = self._settings.model
+        further = self._settings.in_model, self._origin, self._demand(span), self._cached, place
+        moment: Moment = model.moment(*further) if model.phased else plain_moment(model, *further)
+        return moment
 
     def _demand(self, span: tuple[float, float], engine: str = "") -> Demand:
         options = self._options
