@@ -31,6 +31,7 @@ USES = {
     "reporting": "sw.report(net, sections=['parts'])",
     "torsional": "sw.torsional.Section",
     "live": "sw.live.Session(net, t_end=0.1)",
+    "stepper": "net.compile().start().step(0.1)",
 }
 """By feature, something small that takes it."""
 
@@ -47,7 +48,12 @@ JOINS = {
     "modelfiles": ("shaftwork.reporting", "shaftwork.live"),
     "reporting": ("shaftwork.live",),
     "frequency": ("shaftwork.live", "shaftwork.torsional.forced_train"),
-    "hybrid": ("shaftwork.waves.hybrid_wave_model", "shaftwork.waves.hybrid_waves", "shaftwork.sweep.hybrid_ensemble"),
+    "hybrid": (
+        "shaftwork.waves.hybrid_wave_model",
+        "shaftwork.waves.hybrid_waves",
+        "shaftwork.sweep.hybrid_ensemble",
+        "shaftwork.stepper.hybrid_moments",
+    ),
     "latex": (
         "shaftwork.lagrange.lagrange_print",
         "shaftwork.reduce.reduction_print",

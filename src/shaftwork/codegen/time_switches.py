@@ -143,7 +143,8 @@ class Switching:
         self._narrow = tuple(_narrow(form))
         self._unsolved = tuple(_unsolved(form))
         every = (*self._switches, *self._narrow, *self._unsolved)
-        self._places = sorted({place for one in every for place in one.places})
+        self.places = sorted({place for one in every for place in one.places})
+        """Of the parameters on which the instants depend."""
         self._form = form
         self._timelines = BoundedCache[tuple[bytes, float, float, bool], Timeline](8)
 
@@ -190,7 +191,7 @@ class Switching:
         """
         if not (self._switches or self._narrow or self._unsolved or self._form.samples):
             return NOTHING
-        key = (p[self._places].tobytes(), t0, t_end, modes)
+        key = (p[self.places].tobytes(), t0, t_end, modes)
         return self._timelines(key, lambda: self._searched(p, t0, t_end, modes=modes))
 
     def _searched(self, p: Array, t0: float, t_end: float, *, modes: bool) -> Timeline:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from functools import cached_property, partial
 from types import MappingProxyType
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
@@ -32,6 +32,9 @@ from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.prepared import OperatingPoint, in_its_size
 from shaftwork.pipeline.settled import SteadyState, refuse_moving, warn_of_earlier_levels
 from shaftwork.results.solution import Solution
+
+if TYPE_CHECKING:
+    from shaftwork.stepper.moments import Moment
 
 MOST_CHANGES = 100
 """Changes of mode on the way to a steady operation."""
@@ -124,13 +127,20 @@ class HybridModel(Model):
     def _motion(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
         first, p = self.equation_sets.first_equations(values)
         return in_its_size(
-            first.model.form, first.prepared(p), demand, lambda sized: self._run_through(values, initial, sized)
+            first.model.form, first.prepared(p), demand, lambda sized: self.run_once(values, initial, sized)
         )
 
-    def _run_through(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
+    def run_once(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
+        """See `Model.run_once`."""
         run = HybridRun(self.equation_sets, values, demand)
         run.march(initial)
         return solution(run, self.name)
+
+    def moment(self, *arguments: Any) -> Moment:
+        """The network at one instant of a stepped motion; arguments as of `hybrid_moment`."""
+        from shaftwork.stepper.hybrid_moments import hybrid_moment
+
+        return hybrid_moment(self, *arguments)
 
     def start_phase(self) -> str:
         """The phase in which a motion from rest begins, "gap open, brake locked".

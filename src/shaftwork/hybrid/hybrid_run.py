@@ -176,7 +176,7 @@ class HybridRun:
         start, equations = self.demand.span[0], regime.equations
         if isinstance(initial, Mapping) and initial and start != 0:
             refuse_incomplete(equations.stores.names, initial, start)
-        x, waves = equations.model.start(equations.prepared(regime.p), initial, self.demand.span)
+        x, waves = equations.model.state_at_start(equations.prepared(regime.p), initial, self.demand.span)
         return HybridState(regime, self._beside_waves(regime, x, waves))
 
     def _going_on(self, rigid: Mapping[int, str], read: HybridState) -> EventOutcome:
@@ -209,7 +209,7 @@ class HybridRun:
     def choose(self) -> tuple[str, str]:
         """The engine for the first phase, and why."""
         state = self.begin(None)
-        problem = self._problem(self.demand.span[0], state)
+        problem = self.problem(self.demand.span[0], state)
         return self._engine(state, lambda: problem) if problem.x0.size else ("exact", PRESCRIBED)
 
     def _engine(self, state: HybridState, problem: Callable[[], Problem]) -> tuple[str, str]:
@@ -219,7 +219,7 @@ class HybridRun:
 
     def _suits_heyoka(self, t: float, state: HybridState) -> bool:
         """Whether heyoka goes on from a time on: it is what was asked for, or suits the modes."""
-        return self.demand.engine != "auto" or self._engine(state, lambda: self._problem(t, state))[0] == "heyoka"
+        return self.demand.engine != "auto" or self._engine(state, lambda: self.problem(t, state))[0] == "heyoka"
 
     def timeline(self, regime: Regime) -> Timeline:
         """The instants at which inputs jump or bend."""
@@ -251,7 +251,7 @@ class HybridRun:
                     "going on. Give it damping or its neighbours an inertia, or let it rest (omega_rest)."
                 )
 
-    def _problem(self, t: float, state: HybridState, in_place: InPlaceEvents | None = None) -> Problem:
+    def problem(self, t: float, state: HybridState, in_place: InPlaceEvents | None = None) -> Problem:
         """The motion from a time on, up to the next instant at which an input jumps."""
         demand, regime, times = self.demand, state.regime, self.timeline(state.regime)
         following = bisect_right(times.stops, t)
@@ -341,7 +341,7 @@ class HybridRun:
     def _followed(self, t: float, state: HybridState) -> tuple[Trajectory, InPlaceEvents]:
         """One run of the engine; where heyoka cannot go on, or a stiff phase is long, another engine begins it anew."""
         in_place = InPlaceEvents(self.event_iteration, state, t, self.note, self._suits_heyoka)
-        problem, noted, soon = self._problem(t, state, in_place), len(self.transitions), [*self._soon]
+        problem, noted, soon = self.problem(t, state, in_place), len(self.transitions), [*self._soon]
         if not problem.x0.size:
             still = without_states(problem, state.regime.model.degree)
             return replace(still, end=(problem.t_end, problem.x0)), in_place
@@ -372,16 +372,22 @@ class HybridRun:
     def _solve(
         self, problem: Problem, name: str, why: str, solver: Callable[[Problem], Trajectory] | None = None
     ) -> Trajectory:
-        entry = ENGINES[name]
-        assert entry.following is not None  # noqa: S101 (`EquationSets.engine` refuses others)
-        share, loosest = entry.following
-        # nearer to rounding than this no engine gets more exact
-        tight = max(min(share * problem.rtol, loosest), min(problem.rtol, 1e-14))
-        if tight != problem.rtol:
-            problem = changed(problem, rtol=tight, atol=problem.atol * (tight / problem.rtol))
+        entry, problem = ENGINES[name], tightened_for(problem, name)
         trajectory = choice.solve(problem, name, why)[0] if solver is None else solver(problem)
         if trajectory.caveat:
             warn(trajectory.caveat, AccuracyWarning)
         if not self.engine:
             self.engine, self.why = entry.part_of or name, why
         return trajectory
+
+
+def tightened_for(problem: Problem, engine: str) -> Problem:
+    """The same problem with the tolerance with which an engine follows guards."""
+    following = ENGINES[engine].following
+    assert following is not None  # noqa: S101 (`EquationSets.engine` refuses others)
+    share, loosest = following
+    # nearer to rounding than this no engine gets more exact
+    tight = max(min(share * problem.rtol, loosest), min(problem.rtol, 1e-14))
+    if tight == problem.rtol:
+        return problem
+    return changed(problem, rtol=tight, atol=problem.atol * (tight / problem.rtol))

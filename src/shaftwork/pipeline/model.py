@@ -58,6 +58,7 @@ from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
     from shaftwork.frequency.linear_model import LinearModel
+    from shaftwork.stepper.simulation import Simulation
 
 VARIANTS = 8
 """Models of other structure, and choices of an engine, that are kept for later calls."""
@@ -145,10 +146,10 @@ class Model(CompiledModel):
         refuse_unrecorded(self.form, as_names(angles))
         values = self._checked_all(parameters)
         initial, t_start = self._start(initial, t_start)
-        if self._changes_structure(values):
+        if self.changes_structure(values):
             options: dict[str, Any] = {"t_start": t_start, "rtol": rtol, "atol": atol, "t_eval": t_eval}
             options |= {"engine": engine, "initial": initial, "max_steps": max_steps, "progress": progress}
-            return self._variant(values).simulate(t_end, **options)
+            return self.variant(values).simulate(t_end, **options)
         told, span = Callback(progress), time_span(0.0 if t_start is None else t_start, t_end)
         wanted = relative_tolerance(rtol), atol, output_times(t_eval, *span), engine, step_limit(max_steps)
         demand = Demand(span, *wanted, told if progress else None)
@@ -159,6 +160,12 @@ class Model(CompiledModel):
         taken = demand.engine if motion.phases else motion.engine
         again = Repetition(self._rebuild, self.netlist, demand, taken, values, initial, self)
         return replace(motion, parameters=parameters, initial=dict(initial or {}), rtol=demand.rtol, again=again)
+
+    def start(self, **options: Any) -> Simulation:
+        """A motion that is stepped from outside, with inputs set between the steps; options as of `Simulation`."""
+        from shaftwork.stepper.simulation import Simulation
+
+        return Simulation(self, **options)
 
     def _start(
         self, initial: Mapping[str, float] | Solution | None, t_start: float | None
@@ -172,13 +179,17 @@ class Model(CompiledModel):
 
     def _motion(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
         prepared = self.prepare(self.vector(values) if values else self.defaults)
-        return in_its_size(self.form, prepared, demand, lambda sized: self._run(prepared, initial, sized))
+        return in_its_size(self.form, prepared, demand, lambda sized: self.run_once(values, initial, sized))
+
+    def run_once(self, values: Mapping[str, float], initial: Given, demand: Demand) -> Solution:
+        """A motion with the tolerances of the sizes in `demand`, whatever its own size is; values are checked."""
+        return self._run(self.prepare(self.vector(values) if values else self.defaults), initial, demand)
 
     def prepare(self, p: Array) -> Prepared:
         """Everything that depends on a parameter vector alone; the last one is kept."""
         return self._prepared(p.tobytes(), lambda: Prepared(self, p))
 
-    def start(
+    def state_at_start(
         self, prepared: Prepared, initial: Mapping[str, float] | None, span: tuple[float, float]
     ) -> tuple[Array, Any]:
         """The states (n,) at the start of a run, and what else is on its way then; without waves that is nothing.
@@ -200,7 +211,7 @@ class Model(CompiledModel):
         return initial_state(prepared.bound, initial or {}, after), None
 
     def _run(self, prepared: Prepared, initial: Given, demand: Demand) -> Solution:
-        x0, waves = self.start(prepared, initial, demand.span)
+        x0, waves = self.state_at_start(prepared, initial, demand.span)
         if (sampled := prepared.sampled(demand.span)) is not None:
             x0 = sampled(demand.span[0], x0)
         problem, bind = prepared.problem(x0, demand), lambda: prepared.bound
@@ -243,8 +254,8 @@ class Model(CompiledModel):
         refuse_motion(initial, "steady_state")
         values = self._checked_all(parameters)
         time = t if isinstance(t, float) and t == math.inf else in_si("t", t, "s")
-        if self._changes_structure(values):
-            return self._variant(values).steady_state(time, initial=initial)
+        if self.changes_structure(values):
+            return self.variant(values).steady_state(time, initial=initial)
         return self._steady(values, time, initial)
 
     def _steady(self, values: Mapping[str, float], t: float, initial: Given) -> SteadyState:
@@ -252,8 +263,8 @@ class Model(CompiledModel):
 
     def start_equations(self, values: Mapping[str, float]) -> BoundArrays:
         """The equations of which start values tell the states."""
-        if self._changes_structure(values):
-            return self._variant(values).start_equations({})
+        if self.changes_structure(values):
+            return self.variant(values).start_equations({})
         return self.bind(self.vector(values))
 
     def start_phase(self) -> str:
@@ -278,8 +289,8 @@ class Model(CompiledModel):
             SimulationError: a law has no finite slope at the point, or a shaft is a wave, which no matrix holds.
         """
         values = self._checked_all(parameters)
-        if self._changes_structure(values):
-            return self._variant(values).linearize(at, inputs=inputs, outputs=outputs, t=t)
+        if self.changes_structure(values):
+            return self.variant(values).linearize(at, inputs=inputs, outputs=outputs, t=t)
         with muted(PulsationWarning):  # matrices are those of a moment
             return self.near(at, t, inputs, outputs, values)
 
@@ -308,7 +319,7 @@ class Model(CompiledModel):
 
     def _choice(self, demand: Demand) -> tuple[str, str]:
         prepared = self.prepare(self.defaults)
-        x0, _ = self.start(prepared, None, demand.span)
+        x0, _ = self.state_at_start(prepared, None, demand.span)
         return self._engine(prepared, prepared.problem(x0, demand), "auto")
 
     def _solve(
@@ -347,7 +358,7 @@ class Model(CompiledModel):
         self._choices = [*self._choices[1 - VARIANTS :], (key, prepared.p, chosen)]
         return chosen
 
-    def _changes_structure(self, values: Mapping[str, float]) -> bool:
+    def changes_structure(self, values: Mapping[str, float]) -> bool:
         """Whether other equations hold for new values."""
         if not values:
             return False
@@ -360,7 +371,7 @@ class Model(CompiledModel):
             raise ParameterError(f"parameters = {parameters!r} must map names to values, such as {{'shaft.c': 3e4}}.")
         return checked_parameters(self.netlist, parameters)
 
-    def _variant(self, values: Mapping[str, float]) -> Model:
+    def variant(self, values: Mapping[str, float]) -> Model:
         """The model of the same network with other values where these change its structure; the last few are kept."""
         return self._variants(tuple(sorted(values.items())), lambda: self._rebuild(self.netlist.with_values(values)))
 

@@ -105,10 +105,15 @@ def ending_of(motion: Solution, graph: CircuitGraph) -> Ending:
             f"{first_few(other)}. Give a motion of the same network; numbers of its parts may differ. "
             "Or begin with start values, initial={name: sol[name][-1] for name in sol.states} and t_start=sol.t[-1]."
         )
+    return handed_over(motion, motion.parameters)
+
+
+def handed_over(motion: Solution, parameters: Mapping[str, float]) -> Ending:
+    """Where a motion with these values of the parameters ended; it is of the network that goes on."""
     t, x = float(motion.t[-1]), motion.x[-1]
     observer, carried = motion.observer, getattr(motion.dense, "carried", None)
     waves = None if carried is None else carried(t)
-    return Ending(observer.held(t, x), t, observer.read_at(t), observer.modes_at(t), motion.parameters, waves)
+    return Ending(observer.held(t, x), t, observer.read_at(t), observer.modes_at(t), parameters, waves)
 
 
 def time_of_start(t_start: Any, initial: Any) -> Any:

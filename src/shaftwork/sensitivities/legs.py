@@ -178,7 +178,7 @@ def _through_phases(model: HybridModel, span: tuple[float, float], initial: Give
 def _start(run: HybridRun, initial: Given) -> Leg:
     regime, span = run.event_iteration.transfer.regime(run.equation_sets.first), run.demand.span
     equations, p = regime.equations, regime.p
-    x, _ = equations.model.start(equations.prepared(p), initial, span)
+    x, _ = equations.model.state_at_start(equations.prepared(p), initial, span)
     after = run.timeline(regime).sides(span[0])[1]
     return Leg(
         start=span[0],

@@ -349,6 +349,6 @@ def _start(
 ) -> tuple[tuple[str, ...], Array]:
     """The states by name, and where they start, in the equations in which nothing is joined."""
     if not model.phased:
-        return tuple(model.states), model.start(model.prepare(model.vector(values)), initial, span)[0]
+        return tuple(model.states), model.state_at_start(model.prepare(model.vector(values)), initial, span)[0]
     first, p = cast("HybridModel", model).equation_sets.first_equations(values)
-    return tuple(first.model.states), first.model.start(first.prepared(p), initial, span)[0]
+    return tuple(first.model.states), first.model.state_at_start(first.prepared(p), initial, span)[0]

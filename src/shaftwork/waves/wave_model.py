@@ -29,10 +29,10 @@ class WaveModel(Model):
         """The network with springs in place of its waves: it stands and turns steadily as they do."""
         return self._rebuild(twin(self.netlist))
 
-    def start(
+    def state_at_start(
         self, prepared: Prepared, initial: Mapping[str, float] | None, span: tuple[float, float]
     ) -> tuple[Array, Any]:
-        """The states (n,) at the start of a run, and the waves where they are not at rest; see `Model.start`.
+        """The states (n,) at the start of a run, and the waves where they are not at rest; see `Model.state_at_start`.
 
         Warns:
             AccuracyWarning: the motion goes on without the waves that were on their way.

@@ -126,6 +126,7 @@ class HeldParameters:
     """
 
     def __init__(self, functions: Sequence[Held], variables: Sequence[Any], first: int) -> None:
+        self.first = first
         self._functions, self._places = tuple(functions), slice(first, first + len(functions))
         self.by_switch = {one.switch: k for k, one in enumerate(self._functions) if one.switch is not None}
         """The number of each function that steps with the motion, by its switch."""

@@ -71,10 +71,11 @@ class ModeEquations:
         """Where what holds is numbers in the equations: those in which nothing does, of which these are a copy."""
         self.stores, self.quantities = StateTransfer(model.form), Names(model.form)
         self._places = {name: k for k, name in enumerate(model.parameters)}
-        self._rows = rows = model.rows if rows is None and None not in forms else rows
-        self._readings = readings = NamedReadings(model.form) if rows is None else Observables(model.form, rows)
+        self.rows = rows = model.rows if rows is None and None not in forms else rows
         names = tuple(Symbol(name, real=True) for name in model.parameters)
         self._parameters = names if rows is None else rows.parameters
+        self.readings = readings = NamedReadings(model.form) if rows is None else Observables(model.form, rows)
+        """What parts and nodes show, as expressions."""
         self.parts = {part.name: part for part in model.form.graph.parts}
         mode_guards = ModeGuards(model.form, machines, forms, readings)
         self.resting, self.watched, self.sides = mode_guards.resting, mode_guards.watched, mode_guards.sides
@@ -161,11 +162,11 @@ class ModeEquations:
 
     @cached_property
     def _many(self) -> Callable[..., Any]:
-        return vectorised_list((TIME, *self._readings.symbols, *self._parameters), self.expressions)
+        return vectorised_list((TIME, *self.readings.symbols, *self._parameters), self.expressions)
 
     def _read(self, p: Array) -> Callable[[Array, Array], Array]:
         """What guards are made of at times (k,) and states (k, n): the states, or quantities that follow from them."""
-        readings = self._readings
+        readings = self.readings
         if not isinstance(readings, NamedReadings):
             return lambda _, states: states.T
         bound, reads = self.bound(p), [methodcaller("quantity", quantity) for quantity in readings.quantities]
@@ -204,7 +205,7 @@ class ModeEquations:
         """What is made of a machine's parameters, in those of the network; zero where there is nothing."""
         machine, of_part = self.machines[number], as_expression(expression or 0)
         part = self.parts[machine.part.name]
-        return self._translated((number, of_part), lambda: self._readings.guard(part, machine.modes, of_part))
+        return self._translated((number, of_part), lambda: self.readings.guard(part, machine.modes, of_part))
 
     def problem(self, modes: ModeNames, p: Array) -> Problem:
         """What is the same in all phases of these modes; the rest is empty."""
@@ -273,7 +274,7 @@ class ModeEquations:
 
     def _rough(self, p: Array, modes: ModeNames, times: Array, states: Array) -> tuple[float, str] | None:
         """The first time at which a law or a guard has no value in some branch, and which one."""
-        law, symbols = rough(self.bound(p), times, states), (TIME, *self._readings.symbols, *self._parameters)
+        law, symbols = rough(self.bound(p), times, states), (TIME, *self.readings.symbols, *self._parameters)
         for active in () if law is not None else self.watched(modes):
             function = vectorised(symbols, self.expressions[active.guard])
             quantities = np.array([*self._read(p)(times, states)]).reshape(-1, times.size)
@@ -338,7 +339,7 @@ class ModeEquations:
 
     def motion(self, p: Array) -> tuple[Motion, GuardsAt, Near]:
         """Rates and guards together, guards alone, and guards `around` an instant, from a time in s and states."""
-        if self._rows is not None:
+        if self.rows is not None:
             return self.whole.motions(self.values(p).tolist())
         bound, guards = self.bound(p), self.guards(p)
 
@@ -353,7 +354,7 @@ class ModeEquations:
     @cached_property
     def motions(self) -> Callable[[list[float]], tuple[Motion, GuardsAt, Near]]:
         """What makes `motion` of the values of all parameters."""
-        rows = self._rows
+        rows = self.rows
         assert rows is not None  # noqa: S101 (asked only then)
         return bindable({"t": TIME, "x": rows.states}, {"p": rows.parameters}, rows.rates, self.expressions)
 
@@ -369,7 +370,7 @@ class ModeEquations:
     @cached_property
     def series(self) -> Any:
         """The same, made where it is kept."""
-        if (rows := self._rows) is None or not (rows.states or self.clocks) or not available("heyoka"):
+        if (rows := self.rows) is None or not (rows.states or self.clocks) or not available("heyoka"):
             return None
         from shaftwork.codegen.taylor.heyoka import build
 

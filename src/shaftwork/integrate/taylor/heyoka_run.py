@@ -52,23 +52,7 @@ class TaylorRun:
 
     def piece(self, piece: SmoothInterval, advance: Advance) -> None:
         """Bring the run to the end of a piece; `advance` records what it passes."""
-        integrator, self._begun = self.integrator, None
-        integrator.time = piece.start
-        integrator.state[:] = self.start = start_of_piece(self.problem, piece, self.state)
-        # heyoka keeps no parameters behind the last one that the rows contain
-        used = min(integrator.pars.size, self.parameters.size)
-        if self.program.held is not None:
-            inside = piece.low + SOMEWHERE * (piece.high - piece.low)
-            self.program.held.start(piece.start, inside, self.start, self.parameters)
-        integrator.pars[:used] = self.parameters[:used]
-        integrator.reset_cooldowns() if integrator.with_events else None
-        if self.problem.guards is not None:
-            self._sizes = np.fmax(self.problem.guards.sizes, 1.0).tolist()
-            self._sides = integrator.pars[self.program.sides]
-            self._offsets = integrator.pars[self.program.offsets]
-            self._guard([*enumerate(self.problem.guards.sides.tolist())], self.problem.guards.offsets.tolist())
-        self.program.weigh(integrator)
-        watch = self._watch(piece)
+        integrator, watch = self.integrator, self.begin(piece)
         self.lent.listeners.clear()
         longest = self._first_step(piece)
         self.lent.listeners[:] = [self._goes_on] if watch is None else []
@@ -98,6 +82,26 @@ class TaylorRun:
             raise self._failure(piece, "err_nf_state", watch)
         if self.problem.past_guards is not None:
             self.problem.past_guards.refuse_missed(self.met, integrator.time, self.state)
+
+    def begin(self, piece: SmoothInterval) -> SwitchWatch | None:
+        """Set the integrator for the start of a piece; what looks after the switches, where the motion passes them."""
+        integrator, self._begun = self.integrator, None
+        integrator.time = piece.start
+        integrator.state[:] = self.start = start_of_piece(self.problem, piece, self.state)
+        # heyoka keeps no parameters behind the last one that the rows contain
+        used = min(integrator.pars.size, self.parameters.size)
+        if self.program.held is not None:
+            inside = piece.low + SOMEWHERE * (piece.high - piece.low)
+            self.program.held.start(piece.start, inside, self.start, self.parameters)
+        integrator.pars[:used] = self.parameters[:used]
+        integrator.reset_cooldowns() if integrator.with_events else None
+        if self.problem.guards is not None:
+            self._sizes = np.fmax(self.problem.guards.sizes, 1.0).tolist()
+            self._sides = integrator.pars[self.program.sides]
+            self._offsets = integrator.pars[self.program.offsets]
+            self._guard([*enumerate(self.problem.guards.sides.tolist())], self.problem.guards.offsets.tolist())
+        self.program.weigh(integrator)
+        return self._watch(piece)
 
     def _guard(self, ends: Sequence[tuple[int, float]], offsets: Sequence[float]) -> None:
         """Watch the guards that end the phase from here on, by their numbers and sides, and no others.
@@ -166,7 +170,7 @@ class TaylorRun:
             integrator.step(max_delta_t=min(longest, piece.end - piece.start), write_tc=True)
             step = integrator.time - start
             good = not (step > 0.0 and np.isfinite(integrator.state).all()) or (
-                _satisfied(self.problem, self.problem.rhs, piece, integrator.tc, start, self._inside[-1] * step, 0.0)
+                satisfied(self.problem, self.problem.rhs, piece, integrator.tc, start, self._inside[-1] * step, 0.0)
                 and (self.program.all_timed or keeps_sides(self.program, integrator, parameters, start))
             )
             integrator.time = start
@@ -193,7 +197,7 @@ class TaylorRun:
                 if (now := bisect_right(changes, start)) > past:
                     rhs, past = self.resets[now - 1][1](), now
                 for part in self._inside:
-                    if not _satisfied(self.problem, rhs, piece, terms, start, part * (end - start), sizes):
+                    if not satisfied(self.problem, rhs, piece, terms, start, part * (end - start), sizes):
                         reason = f"up to t = {end:.9g} s a law has a root or a pole that a Taylor series does not show"
                         raise SeriesError(str(series_failure(self.problem, start, terms[:, 0], reason)), reason)
 
@@ -261,7 +265,7 @@ def series_failure(problem: Problem, t: float, x: Array, reason: str) -> Simulat
     return failure(problem, "heyoka", t, x, reason)
 
 
-def _satisfied(
+def satisfied(
     problem: Problem,
     rhs: Rates,
     piece: SmoothInterval,

@@ -49,7 +49,7 @@ def solve(problem: Problem) -> Trajectory:
     return Trajectory(t, x, dense, {"steps": dense.steps.size - 1}, met=dense.met, end=end)
 
 
-def _tolerance(problem: Problem) -> float:
+def tolerance(problem: Problem) -> float:
     """heyoka's one tolerance, a part of the largest state, which torques are.
 
     Speeds keep some five digits more than that, in measured motions with gaps and clutches; where torques are larger
@@ -63,7 +63,7 @@ def _tolerance(problem: Problem) -> float:
 
 
 def _on_grid(problem: Problem, times: Array) -> Trajectory:
-    with problem.program.program.lent(_tolerance(problem)) as lent:
+    with problem.program.program.lent(tolerance(problem)) as lent:
         return _filled(TaylorRun(problem, lent), times)
 
 
@@ -102,7 +102,7 @@ class _TaylorReplay:
     @cached_property
     def _replayed(self) -> tuple[tuple[tuple[Any, ...], ...], int | None]:
         problem, recorders = self._problem, list[_SegmentRecorder]()
-        with problem.program.program.lent(_tolerance(problem)) as lent:
+        with problem.program.program.lent(tolerance(problem)) as lent:
             run = TaylorRun(problem, lent)
             for piece in pieces(problem):
                 recorders.append(_SegmentRecorder(problem, piece.end, [s for s in self._stops if s < piece.end]))

@@ -1,0 +1,1 @@
+"""Motions that are stepped from outside, with inputs that are set between the steps: `Model.start`."""
