@@ -30,6 +30,7 @@ USES = {
     "reporting": "sw.report(net, sections=['parts'])",
     "torsional": "sw.torsional.Section",
     "live": "sw.live.Session(net, t_end=0.1)",
+    "opentorsion": "sw.from_opentorsion({'components': [{'name': 'A', 'elements': []}]})",
 }
 """By feature, something small that takes it."""
 
