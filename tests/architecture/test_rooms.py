@@ -32,6 +32,7 @@ USES = {
     "torsional": "sw.torsional.Section",
     "live": "sw.live.Session(net, t_end=0.1)",
     "stepper": "net.compile().start().step(0.1)",
+    "opentorsion": "sw.from_opentorsion({'components': [{'name': 'A', 'elements': []}]})",
 }
 """By feature, something small that takes it."""
 

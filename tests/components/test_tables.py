@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import random
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -65,8 +67,20 @@ def test_a_motion_under_a_curve_from_a_file_is_that_under_its_points(logged: Pat
         ("0,1\n1,2\n", {"y": 7}, r"no line with numbers in the columns 0, 7"),
         ("0;1\n1;2\n", {}, r"say delimiter and decimal"),
         ("", {}, r"It is empty"),
-        ("0,1\n0,2\n", {}, r"csv': Table: x must increase strictly"),
-        ("0,1\n1,nan\n", {}, r"csv': Table: y\[1\] = nan is not finite"),
+        ("0,1\n0,2\n", {}, r"csv', line 2: column 0 must increase strictly, but 0\.0 follows 0\.0"),
+        ("0,1\n1,nan\n", {}, r"csv', line 2: column 1 holds nan\. Mend"),
+        ("0,1\n1,\n2,3\n", {}, r"line 2: column 1 holds no number"),
+        ("0,1\n1,1_000\n", {}, r"line 2: column 1 holds no number"),
+        ("0,1\n1,inf\n", {}, r"line 2: column 1 holds inf"),
+        ("2026-03-01T12:00,1\n7,2\n", {}, r"line 2: '7\.0' and .* are not of one kind"),
+        ("2026-03-01T12:00,1\n2026-03-01T12:00:01Z,2\n", {}, r"line 2: .* time stamps with a time zone, or without"),
+        ("2026-03-01T12:00,1\n2026-03-01T11:00,2\n", {}, r"line 2: column 0 must increase"),
+        ("t,tau\n0,1\n1,2\n", {"units": ("s", "N*m")}, r"column 0 has no unit in its head, and is wanted in s"),
+        ("t [s],tau [kg]\n0,1\n1,2\n", {"units": ("s", "N*m")}, r"column 1 is given in 'kilogram', but needs N\*m"),
+        ("t [s],n [1/min]\n0,1\n1,2\n", {"units": ("s", "rad/s")}, r"may count revolutions or radians.*Give scale"),
+        ("t [s],n [9**9**9]\n0,1\n1,2\n", {"units": ("s", "rad/s")}, r"has the unit '9\*\*9\*\*9' in its head"),
+        ("t [s],n [foo]\n0,1\n1,2\n", {"units": ("s", "rad/s")}, r"has the unit 'foo', which is not one"),
+        ("0,1\n1,2\n", {"units": "s"}, r"units = 's' must be two units"),
         ("0,1\n1,2\n", {"delimiter": "."}, r"delimiter = '\.' must be one sign"),
     ],
 )
@@ -77,6 +91,87 @@ def test_what_is_wrong_in_a_file_is_said_with_the_file_and_the_line(
     path.write_text(text, encoding="utf-8")
     with pytest.raises(sw.ParameterError, match=message):
         sw.Table.from_csv(path, **arguments)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "t [ms];omega [rpm]\n0;0\n500,5;60\n",
+        "# bench\nt (ms);omega (rpm)\n0;0\n500,5;60\n",
+        "t;omega\nms;rpm\n0;0\n500,5;60\n",
+        "t [ms];omega [kN m]; omega [rpm]\n0;7;0\n500,5;7;60\n",
+    ],
+)
+def test_units_in_the_head_are_converted_to_those_that_are_wanted(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "bench.csv"
+    path.write_text(text, encoding="utf-8")
+    y = "omega [rpm]" if "kN" in text else "omega"
+    curve = sw.Table.from_csv(path, "t", y, delimiter=";", decimal=",", units=("s", "rad/s"))
+    assert curve.xs == pytest.approx((0.0, 0.5005), rel=1e-15)
+    assert curve.ys == pytest.approx((0.0, 2 * np.pi), rel=1e-15)
+    assert sw.Table.from_csv(path, "t", y, delimiter=";", decimal=",").ys == (0.0, 60.0)
+
+
+@pytest.mark.parametrize(
+    ("unit", "wanted", "factor"),
+    [
+        ("Nm", "N*m", 1.0),
+        ("kNm", "N*m", 1e3),
+        ("N m", "N*m", 1.0),
+        ("N·m", "N*m", 1.0),
+        ("N*m*s/rad", "N*m*s/rad", 1.0),
+        ("1/s", "Hz", 1.0),
+        ("%", "1", 0.01),
+        ("mm^2", "m^2", 1e-6),
+    ],
+)
+def test_units_are_read_as_they_are_usually_written(tmp_path: Path, unit: str, wanted: str, factor: float) -> None:
+    path = tmp_path / "bench.csv"
+    path.write_text(f"t [s],y [{unit}]\n0,1\n1,2\n", encoding="utf-8")
+    assert sw.Table.from_csv(path, "t", "y", units=("s", wanted)).ys == pytest.approx((factor, 2 * factor), rel=1e-15)
+
+
+def test_time_stamps_are_seconds_from_the_first(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    rows = ("2026-03-01T23:59:59.75+01:00,1", "2026-03-01T23:00:00.000001Z,2", "2026-03-02 00:00:01+01:00,3")
+    path.write_text("when,tau [Nm]\n" + "\n".join(rows), encoding="utf-8")
+    curve = sw.Table.from_csv(path, "when", "tau", units=("s", "N*m"))
+    assert curve == sw.Table([0.0, 0.250001, 1.25], [1, 2, 3])
+    assert sw.Table.from_csv(path, "when", "tau", units=("ms", None)).xs == pytest.approx((0.0, 250.001, 1250.0))
+
+
+def test_units_that_are_those_wanted_need_no_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pint", None)
+    path = tmp_path / "bench.csv"
+    path.write_text("t [s],tau [N*m],n [rpm]\n0,1,1\n1,2,2\n", encoding="utf-8")
+    assert sw.Table.from_csv(path, "t", "tau", units=("s", "N*m")).ys == (1.0, 2.0)
+    with pytest.raises(sw.MissingExtraError, match=r"shaftwork\[units\]"):
+        sw.Table.from_csv(path, "t", "n", units=("s", "rad/s"))
+
+
+@pytest.mark.slow
+def test_mutated_records_are_read_or_refused(tmp_path: Path) -> None:
+    chance, path = random.Random(3), tmp_path / "bench.csv"  # noqa: S311
+    texts = [LOGGER, "t [ms],omega [rpm]\n0,0\n500,60\n", "2026-03-01T12:00:00,1\n2026-03-01T12:00:01.5,2\n"]
+    for _ in range(1000):
+        text = list(chance.choice(texts))
+        for _ in range(chance.randint(1, 5)):
+            place = chance.randrange(len(text))
+            match chance.randrange(3):
+                case 0:
+                    text[place] = chance.choice(";,.0123456789-eE:TZ[]()\"'\n\0 \u00e4\u0661*/^")
+                case 1:
+                    del text[place : place + chance.randint(1, 5)]
+                case _:
+                    text[place:place] = text[chance.randrange(len(text)) :][:9]
+        path.write_text("".join(text), encoding="utf-8")
+        signs = {"delimiter": ";", "decimal": ","} if ";" in text else {}
+        units = chance.choice(((None, None), ("s", "rad/s"), ("s", "N*m")))
+        try:
+            curve = sw.Table.from_csv(path, units=units, **signs)
+        except sw.ParameterError:
+            continue
+        assert np.isfinite([*curve.xs, *curve.ys]).all()
 
 
 def test_a_file_that_is_not_there_or_no_text_is_named(tmp_path: Path) -> None:

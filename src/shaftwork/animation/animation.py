@@ -13,6 +13,7 @@ from string import Template
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shaftwork.animation.turning import SPEEDS, train_of
 from shaftwork.core.errors import ParameterError
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+Complex = NDArray[np.complex128]
 RATE = 20
 """Pictures per second."""
 SAMPLES = 20
@@ -121,6 +123,45 @@ class Animation:
         return self._html
 
 
+@dataclass(frozen=True)
+class _MotionPicture:
+    """Brings the figure of a motion to a picture; a record, as functions within functions cannot be stored."""
+
+    times: Array
+    angles: Array
+    shares: Array
+    """Of the largest torque."""
+    spokes: Sequence[Any]
+    lines: Sequence[Any]
+    cursor: Any
+    title: Any
+    words: tuple[str, str]
+    phases: tuple[PhaseRow, ...]
+
+    def __call__(self, number: int) -> None:
+        t = self.times[number]
+        turn_spokes(self.spokes, self.angles[number])
+        for line, share in zip(self.lines, self.shares[number], strict=True):
+            line.set_color(_colour(share))
+        self.cursor.set_xdata([t, t])
+        phase = next((row.name for row in self.phases if row.start <= t <= row.end), "")
+        network, slowness = self.words
+        self.title.set_text(_written("\n".join((f"{network}, t = {t:.3f} s", slowness, phase))))
+
+
+@dataclass(frozen=True)
+class _ModePicture:
+    """Brings the figure of a mode to a picture."""
+
+    amplitudes: Complex
+    spokes: Sequence[Any]
+    turns: float
+    """Of the swing from one picture to the next."""
+
+    def __call__(self, number: int) -> None:
+        turn_spokes(self.spokes, (self.amplitudes * np.exp(2j * np.pi * self.turns * number)).real)
+
+
 def animate(
     reader: Reader,
     names: Sequence[str],
@@ -151,15 +192,9 @@ def animate(
     cursor = below.axvline(times[0], color="black", linewidth=0.8)
     title = discs.set_title("", fontsize="small")
 
-    def draw(number: int) -> None:
-        t = times[number]
-        turn_spokes(spokes, angles[number])
-        for line, torque in zip(lines, torques[number], strict=True):
-            line.set_color(_colour(torque / largest))
-        cursor.set_xdata([t, t])
-        phase = next((row.name for row in phases if row.start <= t <= row.end), "")
-        title.set_text(_written("\n".join((f"{reader.title}, t = {t:.3f} s", shown.words, phase))))
-
+    draw = _MotionPicture(
+        times, angles, torques / largest, spokes, lines, cursor, title, (reader.title, shown.words), tuple(phases)
+    )
     draw(0)
     lettered(figure)
     return Animation(figure, count, draw)
@@ -183,12 +218,7 @@ def swinging(title: str, shapes: Mapping[str, complex], seconds: float) -> Anima
     spokes = draw_discs(figure.subplots(), tuple(shapes))
     amplitudes = np.array(list(shapes.values()))
     largest = np.abs(amplitudes).max() or 1.0
-    swings = max(1, round(seconds / SWING))
-
-    def draw(number: int) -> None:
-        turned = amplitudes * np.exp(2j * np.pi * swings * number / count)
-        turn_spokes(spokes, LARGEST_SWING * turned.real / largest)
-
+    draw = _ModePicture(LARGEST_SWING * amplitudes / largest, spokes, max(1, round(seconds / SWING)) / count)
     draw(0)
     lettered(figure)
     return Animation(figure, count, draw)

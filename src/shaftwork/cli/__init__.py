@@ -132,6 +132,13 @@ def _parser() -> argparse.ArgumentParser:
                 default=[],
                 help="another value, in SI or with its unit: shaft.c=2e4, 'J1.J=3 kg*m^2'; as often as needed",
             )
+            subparser.add_argument(
+                "--trust",
+                metavar="PACKAGE",
+                action="append",
+                default=[],
+                help="a package whose modules may run where the file names them for parts; as often as needed",
+            )
         if command.declare:
             command.declare(subparser)
         if command.machines:

@@ -130,7 +130,7 @@ def load(options: Namespace) -> tuple[Network, Scene | None]:
     scene = SCENES.get(name)
     if scene is None and not name.endswith(".toml"):
         raise ModelFileError(f"'{name}' is neither a scene nor a .toml file. The scenes are: {', '.join(SCENES)}.")
-    return with_settings(Network.load(name) if scene is None else scene(), options.set), scene
+    return with_settings(Network.load(name, trust=options.trust) if scene is None else scene(), options.set), scene
 
 
 def end_of(options: Namespace, scene: Scene | None) -> float:

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from shaftwork.core.errors import MissingExtraError, ModelFileError, ParameterError
+from shaftwork.core.parameters import UNIT
 
 if TYPE_CHECKING:
     from shaftwork.components.base import Component
@@ -21,9 +22,6 @@ _QUANTITY = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?:(%)|(?
 """A number and a unit behind it: 3 kg, 94 %, 1500 1/min or 1500/min."""
 _OF_SPEED = re.compile(r"(-?)(?:(\d+\.?\d*|\.\d+)\s*\*\s*)?n(?:\s*/\s*(\d+\.?\d*|\.\d+))?")
 """A multiple of the speed n of a diagram: n, -n, 2*n, n/3, 2*n/3."""
-_UNIT = re.compile(r"(?:[^\W\d]\w*+|(?:\*\*|\^) *[-+]?\d(?:\.\d+)?(?! *(?:\*\*|\^))|[*/() ·])*+")
-"""Names of units, their products and quotients, and powers of one digit: the reader behind computes any other number,
-of any size."""
 
 
 def with_settings(net: Network, settings: Iterable[str]) -> Network:
@@ -233,7 +231,7 @@ def _quantity(name: str, text: str) -> Any:
     longest = 100  # characters
     number = _QUANTITY.fullmatch(text.strip())
     unit = "" if number is None else "percent" if number[2] else number[3] or number[4]
-    if number is None or len(text) > longest or not _UNIT.fullmatch(unit):
+    if number is None or len(text) > longest or not UNIT.fullmatch(unit):
         raise ParameterError(
             f"{name}={text[:longest]} is no number with a unit. Write the number, then units with * / and "
             "powers of one digit, such as '3 kg*m**2'."

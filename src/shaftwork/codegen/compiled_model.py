@@ -111,6 +111,9 @@ class CompiledModel:
         self._bound = BoundedCache[bytes, BoundArrays](1)
         self._machine: MachineCode | None = None
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.form,)
+
     @cached_property
     def parameters(self) -> Mapping[str, float]:
         """Every parameter that is left in a law, "part.parameter" to value in SI."""

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Self
@@ -14,6 +13,7 @@ import numpy as np
 import sympy
 from numpy.typing import NDArray
 
+from shaftwork.components.csv_columns import Columns
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si, numbers_in_si
 
@@ -74,11 +74,14 @@ class Table(sympy.Atom):  # type: ignore[misc]
         delimiter: str = ",",
         decimal: str = ".",
         scale: tuple[float, float] = (1.0, 1.0),
+        units: tuple[str | None, str | None] = (None, None),
     ) -> Self:
         """The curve through two columns of a file, as measuring equipment writes it.
 
         Lines that are empty or begin with "#" are left out, and so are those before the first that has numbers in both
-        columns: of these the last that has the names is the head.
+        columns: of these the last that has the names is the head, with units as "omega [rpm]", "omega (rpm)", or in a
+        line below it. Arguments may be time stamps, "2026-03-01T12:00:00.5", to the microsecond: they become seconds
+        from the first.
 
         Args:
             path: of the file.
@@ -87,15 +90,19 @@ class Table(sympy.Atom):  # type: ignore[misc]
             delimiter: what stands between columns, such as ";" or a tabulator.
             decimal: the decimal sign, "." or ",".
             scale: by which x and y are multiplied, into the units that they are to have; (1e-3, 1) for x in ms.
+            units: to which x and y are converted from the units in the head, ("s", "N*m"); by default as they stand.
 
         Raises:
-            ParameterError: the file cannot be read, has no such column, or a line has no number there; with its line.
+            ParameterError: the file cannot be read, has no such column, or a line has no finite number there or one
+                that does not follow the one before; with its line. Or a unit is missing or of something else.
+            MissingExtraError: a unit is to be converted, and pint is not installed (extra `units`).
         """
         if delimiter == decimal or len(delimiter) != 1:
             raise ParameterError(
                 f"Table.from_csv: delimiter = {delimiter!r} must be one sign, other than that of decimals, {decimal!r}."
             )
-        points = _columns(Path(path), (x, y), delimiter, decimal)
+        wanted = _two_units(units)
+        points = Columns(Path(path), (x, y), delimiter, decimal, wanted).read()
         factors = [in_si(f"Table.from_csv: scale[{place}]", factor) for place, factor in enumerate(scale)]
         try:
             return cls(*([factor * value for value in column] for factor, column in zip(factors, points, strict=True)))
@@ -129,62 +136,11 @@ class Table(sympy.Atom):  # type: ignore[misc]
         return r",\, ".join(points if len(points) <= 4 else [points[0], points[1], r"\ldots", points[-1]])
 
 
-def _columns(path: Path, columns: Sequence[str | int], delimiter: str, decimal: str) -> list[list[float]]:
-    """The numbers of some columns of a file.
-
-    Args:
-        path: of the file.
-        columns: names or numbers from 0.
-        delimiter: between columns.
-        decimal: sign.
-
-    Raises:
-        ParameterError: as of `Table.from_csv`.
-    """
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = [(line, [cell.strip() for cell in row]) for line, row in _rows(file, delimiter)]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise ParameterError(f"The table '{path}' cannot be read: {error}.") from None
-    places, first = _places(path, rows, columns, decimal)
-    values = [(line, [_float(row, place, decimal) for place in places]) for line, row in rows[first:]]
-    for line, numbers in values:
-        if None in numbers:
-            column = columns[numbers.index(None)]
-            raise ParameterError(f"'{path}', line {line}: column {column!r} holds no number. Mend or remove the line.")
-    return [list(column) for column in zip(*(numbers for _, numbers in values), strict=True)]
-
-
-def _rows(lines: Iterable[str], delimiter: str) -> Iterator[tuple[int, list[str]]]:
-    reader = csv.reader(lines, delimiter=delimiter)
-    return ((reader.line_num, row) for row in reader if any(map(str.strip, row)) and not row[0].startswith("#"))
-
-
-def _places(
-    path: Path, rows: Sequence[tuple[int, list[str]]], columns: Sequence[str | int], decimal: str
-) -> tuple[list[int], int]:
-    """Numbers of the columns, and of the first row with numbers in them."""
-    heads: list[tuple[str, ...]] = [()]
-    for count, (_, row) in enumerate(rows):
-        head = next((head for head in reversed(heads) if all(c in head for c in columns if isinstance(c, str))), None)
-        if head is not None:
-            places = [column if isinstance(column, int) else head.index(column) for column in columns]
-            if all(_float(row, place, decimal) is not None for place in places):
-                return places, count
-        heads.append(tuple(row))
-    named = f" Its first line is: {', '.join(heads[1])}." if len(heads) > 1 else " It is empty."
-    raise ParameterError(
-        f"'{path}' has no line with numbers in the columns {', '.join(map(repr, columns))}.{named} Name columns by "
-        "their head or their number from 0, and say delimiter and decimal where they are not ',' and '.'."
-    )
-
-
-def _float(row: Sequence[str], place: int, decimal: str) -> float | None:
-    """The number in a place of a row, or None."""
-    try:
-        return float(row[place].replace(decimal, ".")) if 0 <= place < len(row) else None
-    except ValueError:
-        return None
+def _two_units(units: Any) -> tuple[str | None, str | None]:
+    match units:
+        case [(str() | None) as x, (str() | None) as y]:
+            return x, y
+    raise ParameterError(f"Table.from_csv: units = {units!r} must be two units as texts or None, such as ('s', 'N*m').")
 
 
 def interpolate(x: Any, samples: Samples) -> Any:

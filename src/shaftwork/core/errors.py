@@ -47,10 +47,13 @@ class NetworkError(ShaftworkError, ValueError):
     """A network cannot be assembled; `problems` holds every reason found, not only the first."""
 
     def __init__(self, title: str, problems: tuple[Diagnostic, ...]) -> None:
-        self.problems = problems
+        self.problems, self._title = problems, title
         count = "1 problem" if len(problems) == 1 else f"{len(problems)} problems"
         lines = [f"{title}: {count}", *(f"  {number}. {problem}" for number, problem in enumerate(problems, 1))]
         super().__init__("\n".join(lines))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return NetworkError, (self._title, self.problems)
 
 
 class NetworkWarning(UserWarning):
@@ -98,6 +101,10 @@ class MissingExtraError(ShaftworkError, ImportError):
 
     def __init__(self, library: str, extra: str, purpose: str) -> None:
         super().__init__(f"{purpose} needs {library}. Install it with: pip install 'shaftwork[{extra}]'", name=library)
+        self._needs = library, extra, purpose
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return MissingExtraError, self._needs
 
 
 def imported(library: str, extra: str, purpose: str) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import dataclasses
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -23,6 +24,9 @@ PER_ANGLE = ("rad", "N*m/A")
 """In SI units of what is per angle or speed: a torque constant in N*m/A is one of V*s/rad, too."""
 RATES = ("minute", "hour", "hertz")
 """In units of speeds that are given in revolutions as a rule."""
+UNIT = re.compile(r"(?:[^\W\d]\w*+|(?:\*\*|\^) *[-+]?\d(?:\.\d+)?(?! *(?:\*\*|\^))|[*/() ·])*+")
+"""Names of units, their products and quotients, and powers of one digit: the reader behind computes any other number,
+of any size."""
 BOUNDS = ("above", "at_least", "at_most", "nonzero", "whole", "law", "record")
 """Fields of `Parameter` that say which values are admissible."""
 

@@ -14,6 +14,7 @@ from sympy import Add, Expr, Integer, count_ops, together
 
 from shaftwork.components.law_slopes import slope
 from shaftwork.components.laws import t as TIME
+from shaftwork.core.storing import StoredByFields
 from shaftwork.equations.assembly import Assembly, FactoredTerms, Sides, Terms, rising_first, sides
 from shaftwork.equations.quantities import rate_of
 from shaftwork.formulation.explicit_rows import LARGEST_BLOCK, congruence, solve_blocks
@@ -78,7 +79,7 @@ class EliminationSystem:
 
 
 @dataclass(frozen=True, eq=False)
-class SolvedForm:
+class SolvedForm(StoredByFields):
     """The three systems of a state form: speeds, torques, and speeds without a store."""
 
     assembly: Assembly

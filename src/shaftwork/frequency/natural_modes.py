@@ -15,6 +15,7 @@ from shaftwork.core.errors import ParameterError, no_quantity
 from shaftwork.core.notebook import html_table
 from shaftwork.core.parameters import in_si, whole
 from shaftwork.core.screen import counted
+from shaftwork.core.storing import StoredByFields
 from shaftwork.frequency.eigenvalues import eigenmodes
 from shaftwork.frequency.exact_lines import Motions
 from shaftwork.frequency.linearization import Linearization
@@ -34,7 +35,7 @@ MOVES = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class NaturalModes:
+class NaturalModes(StoredByFields):
     """The free motions of a network near a point, each x(t) = Re(shape exp(rate t)).
 
     In order: what does not change at all (rigid-body modes, constant torques in closed loops), what decays or grows

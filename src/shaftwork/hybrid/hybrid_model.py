@@ -55,6 +55,9 @@ class PhaseModel(CompiledModel):
         super().__init__(form)
         self.name, self._mode_numbers = name, numbers
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return PhaseModel, (self.form, self.name, dict(self._mode_numbers))
+
     @cached_property
     def parameters(self) -> Mapping[str, float]:
         """Those of the network, and the numbers of the modes that stand in laws."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import reprlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -21,6 +21,7 @@ from shaftwork.components.tables import Interpolation
 from shaftwork.core.errors import ModelFileError, ParameterError
 from shaftwork.core.files import replaced
 from shaftwork.modelfiles import textfile
+from shaftwork.modelfiles.own_parts import checked_trust, import_modules, modules_of
 from shaftwork.modelfiles.textfile import ModelText, PartText
 from shaftwork.network.expressions import parse
 from shaftwork.network.grammar import COMPARISONS, FUNCTION_NAMES, FUNCTIONS, LIMITS, fault_of, tokens_of
@@ -40,7 +41,8 @@ def netlist_text(netlist: Netlist) -> str:
         ModelFileError: a parameter has no text form.
     """
     parts = tuple(_with_records_once(map(_part_text, netlist.placed)))
-    return textfile.write(ModelText(netlist.name, parts, netlist.ports, netlist.impacts))
+    modules = modules_of(item.part for item in netlist.placed)
+    return textfile.write(ModelText(netlist.name, parts, netlist.ports, netlist.impacts, modules))
 
 
 def write_netlist(netlist: Netlist, path: str | Path) -> None:
@@ -60,14 +62,25 @@ def write_netlist(netlist: Netlist, path: str | Path) -> None:
         ) from None
 
 
-def read_netlist(path: str | Path) -> Netlist:
+def read_netlist(path: str | Path, trust: Any = ()) -> Netlist:
     """Read a netlist from a file.
+
+    Args:
+        path: of the file.
+        trust: packages whose modules may be imported where the file names them.
 
     Raises:
         ModelFileError: the file is no model; says where and what would be right.
+        ParameterError: `trust` has no names of packages.
     """
-    model = textfile.read(_path_of(path))
+    trusted = checked_trust(trust)
+    return netlist_of(textfile.read(_path_of(path)), path, trusted)
+
+
+def netlist_of(model: ModelText, path: str | Path, trusted: Sequence[str] = ()) -> Netlist:
+    """The netlist that a text is; arguments and errors as of `read_netlist`."""
     try:
+        import_modules(model.modules, [part.type for part in model.parts if _class_of(part.type) is None], trusted)
         _refuse_endless_laws(model)
         placed = tuple(_placed(part, str(path)) for part in _with_all_records(model.parts))
         return Netlist(model.name, placed, model.ports, model.impacts)

@@ -29,11 +29,13 @@ from typing import Any
 
 from shaftwork.components.tables import Table
 from shaftwork.core.errors import ModelFileError, ParameterError
+from shaftwork.modelfiles.own_parts import MODULE
 from shaftwork.network.grammar import LIMITS
 from shaftwork.network.netlist import IMPACTS, MAXIMUM_NAME, Impacts, is_name
 
-FORMAT = 1
-"""Version of the format; a reader refuses any other."""
+FORMATS = (1, 2)
+"""Versions of the format; the second can name modules. A file is of the first that can say what it says."""
+FORMAT = FORMATS[0]
 LARGEST_FILE = 2_500_000
 """Bytes of a model file; 20000 parts take about 2 000 000."""
 
@@ -88,12 +90,24 @@ class PartText:
 
 @dataclass(frozen=True)
 class ModelText:
-    """A network as it stands in a file: its name, its parts in order, its ports if it is a part of others, impacts."""
+    """A network as it stands in a file.
+
+    Args:
+        name: of the network.
+        parts: in order.
+        ports: if it is a part of others.
+        impacts: as of `Netlist`.
+        modules: that define parts which are not of the library.
+
+    Raises:
+        ModelFileError: a field could not stand in a file.
+    """
 
     name: str
     parts: tuple[PartText, ...] = ()
     ports: tuple[str, ...] = ()
     impacts: Impacts = IMPACTS[0]
+    modules: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         _check_name("name", self.name)
@@ -106,6 +120,9 @@ class ModelText:
         if self.impacts not in IMPACTS:
             words = " or ".join(map(_quoted, IMPACTS))
             raise ModelFileError(f"impacts is {_shown(self.impacts)}. Give {words}, or leave it out.")
+        names = self.modules if isinstance(self.modules, tuple) else (None,)
+        if not all(isinstance(name, str) and MODULE.fullmatch(name) for name in names):
+            raise ModelFileError(f'modules is {_shown(self.modules)}. Give names such as ["mypackage.parts"].')
 
 
 def read(source: str | os.PathLike[str]) -> ModelText:
@@ -141,7 +158,8 @@ def read_table(key: str, text: str) -> Table:
 
 def write(model: ModelText) -> str:
     """The text of a model: `read` of it is the same model, numbers to the last bit; equal models give equal texts."""
-    lines = [f"format = {FORMAT}", f"name = {_quoted(model.name)}"]
+    lines = [f"format = {FORMATS[bool(model.modules)]}", f"name = {_quoted(model.name)}"]
+    lines += [f"modules = [{', '.join(map(_quoted, model.modules))}]"] if model.modules else []
     lines += [f"ports = [{', '.join(map(_quoted, model.ports))}]"] if model.ports else []
     lines += [f"impacts = {_quoted(model.impacts)}"] if model.impacts != IMPACTS[0] else []
     for part in model.parts:
@@ -236,14 +254,17 @@ def _model(text: str, *, is_file: bool) -> ModelText:
     tables = _tables(text)
     if "format" not in tables:
         raise ModelFileError(f"the key format is missing. Start the file with: format = {FORMAT}")
-    if type(tables["format"]) is not int or tables["format"] != FORMAT:
+    version = tables["format"]
+    if type(version) is not int or version not in FORMATS:
         raise ModelFileError(
-            f"format is {_shown(tables['format'])}, and this version reads format {FORMAT}. "
+            f"format is {_shown(version)}, and this version reads the formats {' and '.join(map(str, FORMATS))}. "
             "Update the package if the file is newer."
         )
-    if unknown := [key for key in tables if key not in ("format", "name", "ports", "impacts", "part")]:
+    keys = ("format", "name", *(["modules"] if version > FORMAT else []), "ports", "impacts")
+    if unknown := [key for key in tables if key not in (*keys, "part")]:
         raise ModelFileError(
-            f"the key {unknown[0]} is unknown here. Before the first [[part]] stand format, name, ports and impacts."
+            f"the key {unknown[0]} is unknown here. Before the first [[part]] stand {', '.join(keys[:-1])} and "
+            f"{keys[-1]}."
         )
     name: Any = tables.get("name")
     ports: Any = tables.get("ports", [])
@@ -252,7 +273,10 @@ def _model(text: str, *, is_file: bool) -> ModelText:
         raise ModelFileError(f"part is {_shown(parts)}. {_USE}")
     impacts: Any = tables.get("impacts", IMPACTS[0])
     texts = tuple(_part(table, places) for table, places in zip(parts, lines, strict=True))
-    return ModelText(name, texts, tuple(ports) if isinstance(ports, list) else ports, impacts)
+    modules: Any = tables.get("modules", [])
+    lists = (tuple(names) if isinstance(names, list) else names for names in (ports, modules))
+    ports, modules = lists
+    return ModelText(name, texts, ports, impacts, modules)
 
 
 def _part(table: dict[str, Any], lines: Mapping[str, int]) -> PartText:

@@ -350,15 +350,21 @@ class Network(NetworkBuilder):
         write_netlist(self.netlist(), path)
 
     @classmethod
-    def load(cls, path: str | Path) -> Self:
+    def load(cls, path: str | Path, *, trust: Sequence[str] = ()) -> Self:
         """Read a network from a text file. Nothing in the file is executed.
+
+        Args:
+            path: of the file.
+            trust: packages whose modules may be imported, and so run, where the file names them for parts of one's own;
+                by default none.
 
         Raises:
             ModelFileError: the file cannot be read as a network; says where and why.
+            ParameterError: `trust` has no names of packages.
         """
         from shaftwork.modelfiles.storage import read_netlist
 
-        return cls._of(read_netlist(path))
+        return cls._of(read_netlist(path, trust))
 
     @classmethod
     def _of(cls, netlist: Netlist) -> Self:

@@ -18,6 +18,7 @@ from shaftwork.components.base import Signal
 from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import ParameterError, no_quantity
 from shaftwork.core.parameters import in_si
+from shaftwork.core.storing import StoredByFields
 from shaftwork.frequency import campbell as diagram
 from shaftwork.frequency.analysis import refuse_no_point, speeds_to_give, turning_speeds
 from shaftwork.frequency.exact_lines import ExactSlopes
@@ -115,7 +116,7 @@ class TurningTrain:
 
 
 @dataclass(frozen=True, eq=False)
-class ForcedTrain:
+class ForcedTrain(StoredByFields):
     """A train with its excitations, compiled once for all speeds.
 
     Args:

@@ -17,6 +17,7 @@ from sympy import QQ, QQ_I, Add, Expr, Float, Integer, Poly, Rational, Symbol
 from sympy.polys.densetools import dup_eval
 
 from shaftwork.core.errors import CompileError, ParameterError, SignalError, no_quantity
+from shaftwork.core.storing import StoredByFields
 from shaftwork.equations.small_motions.point_slopes import FRACTION_DIGITS, LawSlopes, PointValues, Slope, Values
 from shaftwork.equations.small_motions.tableau import (
     INPUT,
@@ -40,7 +41,7 @@ Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)
-class TransferFunction:
+class TransferFunction(StoredByFields):
     """A quantity over an input in the image domain: numerator / denominator, without common factors.
 
     `H(2j * pi * f)` is the frequency response. Where there are symbols, `poles`, `zeros`, `coefficients` and values

@@ -1,0 +1,1 @@
+"""Models of openTorsion, its Python objects and its files, as networks."""
