@@ -1,8 +1,8 @@
 """What does a motion cost without heyoka, which has wheels for Linux alone?
 
-Run `python -m benchmarks.portable_engine`. Scenes by the engines `heyoka`, `numba` and `scipy` at rtol 1e-8, 201 outputs.
-First: wall time in s of the first call in this process, in which code is compiled; what numba keeps for other processes
-is made before. CPU: process time in ms of one warm public call, median of five. Error: of the states at the outputs,
+Run `python -m benchmarks.portable_engine`. Scenes by `heyoka`, `numba` and `scipy` at rtol 1e-8, 201 outputs. First:
+wall time in s of the first call in this process, in which code is compiled; what numba keeps for other processes is
+made before. CPU: process time in ms of one warm public call, median of five. Error: of the states at the outputs,
 over the largest of each, against heyoka at 1e-13.
 """
 

@@ -235,7 +235,11 @@ def test_what_differential_equations_alone_have_is_refused_beside_a_sampled_cont
         ask(plant(sampled_pi()))
 
 
-@pytest.mark.parametrize("ask", [sw.Network.circuit, sw.Network.dual, lambda net: sw.reduce.refer(net, "a")], ids=str)
+@pytest.mark.parametrize(
+    "ask",
+    [sw.Network.circuit, sw.Network.dual, lambda net: sw.reduce.refer(net, "a")],
+    ids=["circuit", "dual", "referred"],
+)
 @pytest.mark.parametrize("part", [pi_controller(), sampled_pi()], ids=["continuous", "sampled"])
 def test_what_becomes_another_network_refuses_what_measures_by_name(ask: Any, part: sw.Component) -> None:
     with pytest.raises(sw.NetworkError, match=r"'pi' measures 'J2.omega' by name"):

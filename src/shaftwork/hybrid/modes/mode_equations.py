@@ -394,7 +394,7 @@ class ModeEquations:
     @cached_property
     def machine_program(self) -> Any:
         """The right-hand side in machine code, made where it is kept; None where there is none."""
-        if (rows := self._rows) is None:
+        if (rows := self.rows) is None:
             return None
         states, rates = self._with_clocks(rows)
         return machine_program(replace(rows, states=states, rates=rates), self.model.name)
