@@ -21,7 +21,7 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.components.sampling import Sampler
 from shaftwork.core.domains import ELECTRICAL, ROTATION, SIGNAL, TRANSLATION
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.parameters import LARGEST, parameter
+from shaftwork.core.parameters import LARGEST, is_quantity, parameter
 
 MOST = 64
 """Rows and columns of a matrix: each entry is a term of a law that is printed and compiled."""
@@ -49,17 +49,17 @@ class Gains:
 
     def __post_init__(self) -> None:
         try:
-            values = np.array(self.rows, dtype=float)
-        except (TypeError, ValueError):
-            values = np.full((1, 1), np.nan)
+            values = np.asarray(self.rows)
+        except ValueError:  # rows of different length
+            values = np.array("")
         values = values.reshape((0, 0)) if values.size == 0 else np.atleast_2d(values)
-        size = np.abs(values)
-        if values.ndim > 2 or max(values.shape) > MOST or not (size <= LARGEST).all():
+        real = values.dtype.kind in "iuf" and not is_quantity(self.rows)
+        if not real or values.ndim > 2 or max(values.shape) > MOST or not (np.abs(values) <= LARGEST).all():
             raise ParameterError(
                 f"{reprlib.repr(self.rows)} is no matrix of up to {MOST} by {MOST} finite numbers. Write rows of equal "
                 "length: [[0, 1], [-2, -3]]."
             )
-        object.__setattr__(self, "rows", tuple(tuple(row) for row in values.tolist()))
+        object.__setattr__(self, "rows", tuple(tuple(map(float, row)) for row in values.tolist()))
 
     def __repr__(self) -> str:
         """The text that `read` makes the same of."""
@@ -132,7 +132,7 @@ class Controller(Component):
 
     # ruff takes a field of any type for mutable
     measured: Any = parameter("1", "what it reads, such as J2.omega, shaft.tau_c", record=Listed)  # noqa: RUF009
-    reference: Any = parameter("1", "what the first is to be, over time", law=True, default=0.0, latex="r")  # noqa: RUF009
+    reference: Any = parameter("1", "what the first is to be, in its SI unit", law=True, default=0.0, latex="r")  # noqa: RUF009
     setpoints: Any = parameter("1", "what each of them is to be besides", record=Gains, default=None)  # noqa: RUF009
     acts: Any = parameter("1", f"at its nodes: {', '.join(ACTS)}", record=Listed, default="torque")  # noqa: RUF009
     sample_time: float | None = parameter("s", "time between samples; continuous", above=0, default=None, latex="T")
@@ -148,7 +148,7 @@ class Controller(Component):
         super().__post_init__()
         self._refuse_wrong_sizes()
         inner = [f"x_{k}" for k in range(1, len(self.matrices()[0]) + 1)]
-        inner += [name for name, _ in self._held()]
+        inner += self._held()
         domains = [ACTS[kind][0] for kind in self.acts.names]
         places = [f"_{k}" for k in range(1, len(domains) + 1)] if len(domains) > 1 else [""]
         ports = tuple(Port(f"a{place}", domain) for place, domain in zip(places, domains, strict=True))
@@ -174,9 +174,10 @@ class Controller(Component):
         n, k, m = len(A), len(self.measured.names), len(self.acts.names)
         for name, matrix, shape in (("A", A, (n, n)), ("B", B, (n, k)), ("C", C, (m, n)), ("D", D, (m, k))):
             if matrix.shape != shape:
+                hint = " Name what each output is: acts=['torque', 'torque']." if name in "CD" and m == 1 else ""
                 raise ParameterError(
                     f"{title}: {name} has the shape {matrix.shape} and must have {shape}, as A has {n} rows and "
-                    f"{k} measured quantities lead to {m} outputs ({', '.join(self.acts.names)})."
+                    f"{k} measured quantities lead to {m} outputs ({', '.join(self.acts.names)}).{hint}"
                 )
         if self.setpoints is not None and self.setpoints.array.size != k:
             raise ParameterError(f"{title}: setpoints = {self.setpoints} must be {k} numbers, one for each quantity.")
@@ -185,12 +186,10 @@ class Controller(Component):
         k = len(self.measured.names)
         return np.zeros(k) if self.setpoints is None else self.setpoints.array.ravel()
 
-    def _held(self) -> tuple[tuple[str, str], ...]:
-        """Of a sampled one the names of its outputs as they are held, and their ports; else none."""
-        if self.sample_time is None:
-            return ()
-        several = len(self.acts.names) > 1
-        return tuple((f"x_u_{k}", f"a_{k}" if several else "a") for k in range(1, len(self.acts.names) + 1))
+    def _held(self) -> tuple[str, ...]:
+        """Of a sampled one the names of its outputs as they are held; else none."""
+        outputs = 0 if self.sample_time is None else len(self.acts.names)
+        return tuple(f"x_u_{k}" for k in range(1, outputs + 1))
 
     def inner_ports(self) -> tuple[Port, ...]:
         """One for each state, and of a sampled one for each output that it holds."""
@@ -209,8 +208,7 @@ class Controller(Component):
         A, B, C, D = self.matrices()
         states, sampler = [f"x_{k}" for k in range(1, len(A) + 1)], self.sampler()
         x = [across_of(name) for name in states]
-        held = self._held()
-        for name in (*states, *(name for name, _ in held)):
+        for name in (*states, *self._held()):
             yield AcrossStore(Integer(1), (name, None), name)
         if sampler is None:
             asked = [Float(value) if value else Integer(0) for value in self._setpoints().tolist()]
@@ -220,7 +218,7 @@ class Controller(Component):
                 yield ThroughLaw(_sum(row, x) + _sum(gains, e), (None, name), name.replace("x", "w"))
             given = [_sum(row, x) + _sum(gains, e) for row, gains in zip(C, D, strict=True)]
         else:
-            given = [across_of(name) for name, _ in held]
+            given = [across_of(name) for name in self._held()]
         for law, port, kind in zip(given, self.ports, self.acts.names, strict=True):
             branch = ACTS[kind][1]
             label = port.name.replace("a", "u") if len(self.ports) > 1 else "u"
@@ -261,8 +259,8 @@ class StateSpaceController(Controller):
 
     It measures speeds and voltages of parts and nodes, and what springs and inductors let through: `shaft.tau_c`. An
     angle is a speed that a state integrates. Each output goes to a node of its own, as a torque, force, current or
-    voltage. What its states hold is no energy of the drive. Analogue: a controlled current or voltage source.
-    Source: Åström 2008, section 5.3.
+    voltage. It has no limits: a `SpeedController` has some, with anti-windup. What its states hold is no energy of the
+    drive. Analogue: a controlled current or voltage source. Source: Åström 2008, chapters 6 and 7.
     """
 
     A: Any = parameter("1", "states by states; none", record=Gains, default=None)
@@ -318,7 +316,7 @@ class TransferFunctionController(Controller):
     Law: u = N(s) / M(s) (reference + setpoint - measured), with coefficients from the highest power of s down; a PI
     controller k_p + k_i / s is numerator=[k_p, k_i], denominator=[1, 0]. With a sample time they are polynomials in z,
     and u is held between the instants. Its states are those of the controllable canonical form.
-    Analogue: a controlled current or voltage source. Source: Åström 2008, section 8.
+    Analogue: a controlled current or voltage source. Source: Åström 2008, chapter 8.
     """
 
     numerator: Any = parameter("1", "coefficients, from the highest power down", record=Gains)
