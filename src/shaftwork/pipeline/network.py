@@ -290,12 +290,8 @@ class Network(NetworkBuilder):
         network.analogy = analogy
         return network
 
-    def to_spice(
-        self, t_end: float = 1.0, *, step: float | None = None, initial: Mapping[str, Any] | None = None
-    ) -> str:
-        """The analogue circuit as a deck for ngspice: speeds are voltages, torques currents.
-
-        Modes become laws: what sticks creeps, and diodes, freewheels and switches conduct well or badly.
+    def to_spice(self, t_end: float = 1.0, *, step: float | None = None, initial: Point = None) -> str:
+        """The analogue circuit as a deck for ngspice: speeds are voltages, torques currents, modes smooth laws.
 
         Args:
             t_end: end of the motion, s.
@@ -303,12 +299,11 @@ class Network(NetworkBuilder):
             initial: start values, as for `Model.simulate`.
 
         Raises:
-            NetworkError: the network cannot be assembled, or parts have no form in SPICE, as rigid contacts; lists
-                every reason.
+            NetworkError: the network cannot be assembled, or a part has no form in SPICE, as rigid contacts.
         """
         from shaftwork.spice.deck import deck
 
-        return deck(self, t_end, step, initial)
+        return deck(self.compile(), t_end, step, initial)
 
     def draw(
         self,

@@ -12,7 +12,7 @@ from shaftwork.formulation.form import StateForm, integral_name, store_name
 from shaftwork.network.graph import GraphPart
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import REFERENCE, title
-from shaftwork.pipeline.network import Network
+from shaftwork.pipeline.model import Model
 from shaftwork.spice.smoothed_modes import SmoothedPart, smoothed
 from shaftwork.spice.spice_elements import Elements
 from shaftwork.spice.spice_laws import NoSpiceFormError
@@ -33,7 +33,7 @@ HEAD = """\
 * Run it with: ngspice -b FILE"""
 
 
-def deck(network: Network, t_end: float, step: float | None, initial: Mapping[str, Any] | None) -> str:
+def deck(model: Model, t_end: float, step: float | None, initial: Any) -> str:
     """The text of a deck: `Network.to_spice` says of what.
 
     Raises:
@@ -44,10 +44,10 @@ def deck(network: Network, t_end: float, step: float | None, initial: Mapping[st
     longest = end / STEPS if step is None else in_si("step", step, "s", above=0)
     if longest > end:
         raise ParameterError(f"step = {longest:g} s is longer than t_end = {end:g} s. Leave it out for t_end / {STEPS}.")
-    form = network.compile().form
+    form = model.form
     parts, problems = _smoothed(form)
     elements = Elements(
-        form.graph, parts, form.tree.redundant, _stored(network, form, initial), end, EDGE * longest
+        form.graph, parts, form.tree.redundant, _stored(model, initial), end, EDGE * longest
     )
     lines: list[str] = []
     for part in form.graph.parts:
@@ -56,9 +56,9 @@ def deck(network: Network, t_end: float, step: float | None, initial: Mapping[st
         except NoSpiceFormError as error:
             problems.append(_problem(part, error, form))
     if problems:
-        raise NetworkError(f"'{network.name}' cannot be written for SPICE", tuple(problems))
+        raise NetworkError(f"'{model.name}' cannot be written for SPICE", tuple(problems))
     lines = [*_parameters(lines), *lines, *_rest(elements), *_clocks(elements)]
-    head = HEAD.format(name=" ".join(network.name.split())).splitlines()
+    head = HEAD.format(name=" ".join(model.name.split())).splitlines()
     return "\n".join(_wrapped([*head, *lines, *_analysis(elements, form, end, longest)])) + "\n"
 
 
@@ -79,12 +79,12 @@ def _problem(part: GraphPart, error: NoSpiceFormError, form: StateForm) -> Diagn
     return Diagnostic("no SPICE form", f"{title(part.component)}: {error}.", hint, (part.name,), nodes)
 
 
-def _stored(network: Network, form: StateForm, initial: Mapping[str, Any] | None) -> dict[int, float]:
+def _stored(model: Model, initial: Any) -> dict[int, float]:
     """What is stored at the start, by branch; nothing at rest."""
     if not initial:
         return {}
-    start = network.simulate(1e-12, initial=initial, t_eval=2)
-    graph = form.graph
+    start = model.simulate(1e-12, initial=initial, t_eval=2)
+    form, graph = model.form, model.form.graph
     names = {b.index: store_name(graph, b) for b in graph.branches if b.template.kind in _STORES}
     names |= {index: integral_name(graph, graph.branches[index]) for index in form.integrals}
     return {index: float(start[name][0]) for index, name in names.items()}

@@ -31,7 +31,7 @@ class NoSpiceFormError(Exception):
     """What an expression or a part has that ngspice has not."""
 
 
-class _Printer(StrPrinter):  # type: ignore[misc]
+class _SpicePrinter(StrPrinter):  # type: ignore[misc]
     """Expressions of sympy in the words of ngspice."""
 
     printmethod = "_ngspice"  # tables print themselves for other readers
@@ -221,7 +221,7 @@ def printed(law: Expr) -> str:
         NoSpiceFormError: ngspice has no such function.
     """
     law = law.xreplace({t: Symbol("time"), pi: pi.n(17)})
-    text: str = _Printer().doprint(law)
+    text: str = _SpicePrinter().doprint(law)
     return text
 
 

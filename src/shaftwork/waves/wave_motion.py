@@ -264,7 +264,7 @@ def _warn_of_friction(bound: BoundArrays, impedances: Array) -> None:
     parts = [form.graph.part_of(end) for end in form.waves[::2]]
     for part, impedance in {part.name: (part, Z) for part, Z in zip(parts, impedances, strict=True)}.values():
         value = {name: float(bound.p[place]) for name, place in part.parameters.items()}
-        share = value.get("friction", 0.0) * value["length"] / float(impedance)
+        share = value.get("friction", 0.0) * value.get("length", 0.0) / float(impedance)
         if share > LIGHT:
             warn(
                 f"Shaft '{part.name}': its bearing friction d' L is {share:.2g} of its wave impedance, and Wave() "

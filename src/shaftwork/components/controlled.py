@@ -1,0 +1,163 @@
+"""Sources that follow a voltage or current elsewhere in a circuit, and what netlists of circuits have besides."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, ClassVar
+
+from sympy import Integer
+
+from shaftwork.components.base import Component, Port, Role, Signal, component
+from shaftwork.components.branches import ACROSS, AcrossLaw, Branch, DelayLine, ThroughLaw, across_of, through_of
+from shaftwork.components.contacts import CLOSED
+from shaftwork.components.modes import Leave, Mode, Modes
+from shaftwork.core.domains import ELECTRICAL
+from shaftwork.core.parameters import parameter
+
+FOLLOWING = tuple(Port(name, ELECTRICAL) for name in ("p", "n", "cp", "cn"))
+"""The two ends of what follows, and the two of what it follows."""
+VOLTAGE = across_of("cp") - across_of("cn")
+DELIVERED = {
+    "u": Signal("across", ("p", "n"), ELECTRICAL),
+    "i": Signal("through", ("p", None), ELECTRICAL, -1),
+}
+"""Voltage from p to n, and the current delivered at p."""
+MEASURED = {"i_c": Signal("through", ("cp", None), ELECTRICAL)}
+"""The current from cp to cn."""
+
+
+@component
+class VoltageControlledVoltageSource(Component):
+    """A voltage from p to n that follows the one from cp to cn, through which no current flows.
+
+    Law: u_p - u_n = gain (u_cp - u_cn), whatever current that takes. SPICE: E.
+    """
+
+    gain: float = parameter("1", "voltage over the voltage that it follows")
+
+    role: ClassVar[Role] = "source"
+    ports: ClassVar = FOLLOWING
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        yield AcrossLaw(p.gain * VOLTAGE, ("p", "n"))
+
+    def signals(self) -> dict[str, Signal]:
+        """Its voltage, and the current that it delivers at p."""
+        return DELIVERED
+
+
+@component
+class VoltageControlledCurrentSource(Component):
+    """A current from p through the source to n that follows the voltage from cp to cn.
+
+    Law: i = g (u_cp - u_cn), taken from p and delivered at n. With p at cp and n at cn it is a resistor 1 / g. SPICE: G.
+    """
+
+    g: float = parameter("S", "current over the voltage that it follows")
+
+    role: ClassVar[Role] = "source"
+    ports: ClassVar = FOLLOWING
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        yield ThroughLaw(p.g * VOLTAGE, ("p", "n"))
+
+    def signals(self) -> dict[str, Signal]:
+        """Its voltage, and the current that it delivers at p: below zero where it takes one there."""
+        return DELIVERED
+
+
+@component
+class CurrentControlledCurrentSource(Component):
+    """A current from p through the source to n that follows the one from cp to cn, between which is no voltage.
+
+    Law: i = gain i_c, taken from p and delivered at n, and u_cp = u_cn. SPICE: F.
+    """
+
+    gain: float = parameter("1", "current over the current that it follows")
+
+    role: ClassVar[Role] = "source"
+    ports: ClassVar = FOLLOWING
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        yield AcrossLaw(Integer(0), ("cp", "cn"), "i_c")
+        yield ThroughLaw(p.gain * through_of("i_c"), ("p", "n"), "i")
+
+    def signals(self) -> dict[str, Signal]:
+        """Its voltage, the current that it delivers at p, and the one that it follows."""
+        return {**DELIVERED, **MEASURED}
+
+
+@component
+class CurrentControlledVoltageSource(Component):
+    """A voltage from p to n that follows the current from cp to cn, between which is no voltage.
+
+    Law: u_p - u_n = r i_c, whatever current that takes, and u_cp = u_cn. SPICE: H.
+    """
+
+    r: float = parameter("ohm", "voltage over the current that it follows")
+
+    role: ClassVar[Role] = "source"
+    ports: ClassVar = FOLLOWING
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        yield AcrossLaw(Integer(0), ("cp", "cn"), "i_c")
+        yield AcrossLaw(p.r * through_of("i_c"), ("p", "n"), "u")
+
+    def signals(self) -> dict[str, Signal]:
+        """Its voltage, the current that it delivers at p, and the one that it follows."""
+        return {**DELIVERED, **MEASURED}
+
+
+@component
+class VoltageControlledSwitch(Component):
+    """A switch from p to n with a resistance in either mode, which follows the voltage from cp to cn with hysteresis.
+
+    Law: u_p - u_n = R i with R_on from when u_cp - u_cn rises above u_t + u_h, and with R_off from when it falls below
+    u_t - u_h. A motion begins with the switch open, unless the voltage is above u_t + u_h. Modes: open, closed. SPICE: S.
+    """
+
+    R_on: float = parameter("ohm", "resistance while it is closed", above=0, default=1.0, latex=r"R_{on}")
+    R_off: float = parameter("ohm", "resistance while it is open", above=0, default=1e12, latex=r"R_{off}")
+    u_t: float = parameter("V", "threshold", default=0.0)
+    u_h: float = parameter("V", "hysteresis, half of its width", at_least=0, default=0.0)
+
+    role: ClassVar[Role] = "loss"
+    ports: ClassVar = FOLLOWING
+
+    def modes(self, p: Any) -> Iterator[Modes]:
+        yield Modes(
+            (
+                Mode("open", (Leave(VOLTAGE - p.u_t - p.u_h, "closed"),)),
+                Mode("closed", (Leave(p.u_t - p.u_h - VOLTAGE, "open"),), 1.0, CLOSED),
+            )
+        )
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        yield ThroughLaw(ACROSS / (p.R_on if p.form == CLOSED else p.R_off), ("p", "n"))
+
+    def signals(self) -> dict[str, Signal]:
+        """Its voltage, and the current from p to n."""
+        return {**DELIVERED, "i": Signal("through", ("p", None), ELECTRICAL)}
+
+
+@component
+class TransmissionLine(Component):
+    """A lossless line between two nodes of a circuit, whose other conductor is the reference.
+
+    Law: what leaves one end arrives at the other after the delay, u + Z_0 i there = u - Z_0 i here, with i into the
+    line. Mechanical analogue: a shaft as a `Wave`. SPICE: T. Source: Bergeron 1949.
+    """
+
+    Z_0: float = parameter("ohm", "impedance: voltage over current of a wave", above=0)
+    delay: float = parameter("s", "time from one end to the other", above=0, latex="T")
+
+    ports: ClassVar = (Port("a", ELECTRICAL), Port("b", ELECTRICAL))
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        yield DelayLine(1 / p.Z_0, p.delay, ("a", "b"))
+
+    def signals(self) -> dict[str, Signal]:
+        """Voltage of each end, and the current into the line there."""
+        ends = ("a", "b")
+        voltages = {f"u_{end}": Signal("across", (end, None), ELECTRICAL) for end in ends}
+        return {**voltages, **{f"i_{end}": Signal("through", (end, None), ELECTRICAL) for end in ends}}
