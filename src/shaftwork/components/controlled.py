@@ -8,7 +8,16 @@ from typing import Any, ClassVar
 from sympy import Integer
 
 from shaftwork.components.base import Component, Port, Role, Signal, component
-from shaftwork.components.branches import ACROSS, AcrossLaw, Branch, DelayLine, ThroughLaw, across_of, through_of
+from shaftwork.components.branches import (
+    ACROSS,
+    AcrossStore,
+    Branch,
+    DelayLine,
+    LossyCoupling,
+    ThroughLaw,
+    ThroughStore,
+    across_of,
+)
 from shaftwork.components.contacts import CLOSED
 from shaftwork.components.modes import Leave, Mode, Modes
 from shaftwork.core.domains import ELECTRICAL
@@ -39,7 +48,7 @@ class VoltageControlledVoltageSource(Component):
     ports: ClassVar = FOLLOWING
 
     def branches(self, p: Any) -> Iterator[Branch]:
-        yield AcrossLaw(p.gain * VOLTAGE, ("p", "n"))
+        yield LossyCoupling(((Integer(1), "p", "n"), (-p.gain, "cp", "cn")), (Integer(1), Integer(0)))
 
     def signals(self) -> dict[str, Signal]:
         """Its voltage, and the current that it delivers at p."""
@@ -57,9 +66,12 @@ class VoltageControlledCurrentSource(Component):
 
     role: ClassVar[Role] = "source"
     ports: ClassVar = FOLLOWING
+    inner: ClassVar = (Port("image", ELECTRICAL),)
 
     def branches(self, p: Any) -> Iterator[Branch]:
-        yield ThroughLaw(p.g * VOLTAGE, ("p", "n"))
+        terms = ((Integer(1), "image", None), (Integer(-1), "cp", "cn"), (Integer(0), "p", "n"))
+        yield LossyCoupling(terms, (Integer(1), Integer(0), -p.g))
+        yield ThroughLaw(ACROSS, ("image", None), "image")
 
     def signals(self) -> dict[str, Signal]:
         """Its voltage, and the current that it delivers at p: below zero where it takes one there."""
@@ -79,8 +91,7 @@ class CurrentControlledCurrentSource(Component):
     ports: ClassVar = FOLLOWING
 
     def branches(self, p: Any) -> Iterator[Branch]:
-        yield AcrossLaw(Integer(0), ("cp", "cn"), "i_c")
-        yield ThroughLaw(p.gain * through_of("i_c"), ("p", "n"), "i")
+        yield LossyCoupling(((Integer(1), "cp", "cn"), (Integer(0), "p", "n")), (Integer(1), p.gain))
 
     def signals(self) -> dict[str, Signal]:
         """Its voltage, the current that it delivers at p, and the one that it follows."""
@@ -98,10 +109,12 @@ class CurrentControlledVoltageSource(Component):
 
     role: ClassVar[Role] = "source"
     ports: ClassVar = FOLLOWING
+    inner: ClassVar = (Port("image", ELECTRICAL),)
 
     def branches(self, p: Any) -> Iterator[Branch]:
-        yield AcrossLaw(Integer(0), ("cp", "cn"), "i_c")
-        yield AcrossLaw(p.r * through_of("i_c"), ("p", "n"), "u")
+        yield LossyCoupling(((Integer(1), "cp", "cn"), (Integer(0), "image", None)), (Integer(1), Integer(-1)))
+        yield ThroughLaw(ACROSS, ("image", None), "image")
+        yield LossyCoupling(((Integer(1), "p", "n"), (-p.r, "image", None)), (Integer(1), Integer(0)))
 
     def signals(self) -> dict[str, Signal]:
         """Its voltage, the current that it delivers at p, and the one that it follows."""
@@ -161,3 +174,14 @@ class TransmissionLine(Component):
         ends = ("a", "b")
         voltages = {f"u_{end}": Signal("across", (end, None), ELECTRICAL) for end in ends}
         return {**voltages, **{f"i_{end}": Signal("through", (end, None), ELECTRICAL) for end in ends}}
+
+
+class LineSection(TransmissionLine):
+    """One section of a line: an inductor between two capacitors. It stands and starts as the line does, without waves."""
+
+    declared: ClassVar = TransmissionLine.declared
+
+    def branches(self, p: Any) -> Iterator[Branch]:
+        for end in ("a", "b"):
+            yield AcrossStore(p.delay / p.Z_0 / 2, (end, None), f"u_{end}")
+        yield ThroughStore(1 / (p.delay * p.Z_0), ("a", "b"), "i_c")

@@ -37,6 +37,8 @@ THERMAL = 1.380649e-23 * 300.15 / 1.602176634e-19
 """Thermal voltage in V at 27 degrees Celsius, at which SPICE takes its diodes."""
 LARGEST_EXPONENT = 80.0
 """Up to here a diode is exponential: 1e-14 A times e^80 is beyond any current."""
+DEAD_WITHOUT_CAPACITY = ("vj", "m", "fc", "eg", "xti", "tnom", "level")
+"""Parameters of diodes that change nothing at 27 degrees Celsius where there is no capacity."""
 Model = tuple[Line, str, Mapping[str, str]]
 """Of a .model its line, its type and its parameters."""
 
@@ -195,13 +197,15 @@ class Devices:
 
     def _model(self, line: Line, name: str, kind: str, known: Mapping[str, float]) -> dict[str, float]:
         """The parameters of a model; those that are not known must be zero."""
-        if name.lower() not in self.models:
+        scoped = next((one for one in line.in_scope(name) if one in self.models), None)
+        if scoped is None:
             there = first_few([*self.models]) or "none"
             raise line.error(f"there is no .model '{name}'. Given are: {there}")
-        origin, given, pairs = self.models[name.lower()]
+        origin, given, pairs = self.models[scoped]
         if given != kind:
             raise line.error(f".model {name} is of type '{given}', not '{kind}'")
-        read = {key: self.values.number(origin, text) for key, text in pairs.items()}
+        unread = DEAD_WITHOUT_CAPACITY if kind == "d" and "cjo" not in pairs and "cj0" not in pairs else ()
+        read = {key: self.values.number(origin, text) for key, text in pairs.items() if key not in unread}
         if strange := [key for key, value in read.items() if key not in known and value]:
             raise origin.error(f"{', '.join(strange)} of a model of type {kind} is not read. Known: {', '.join(known)}")
         return {**known, **{key: read[key] for key in known if key in read}}

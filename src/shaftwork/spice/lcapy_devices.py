@@ -122,7 +122,7 @@ class LcapyDevices(Devices):
                 value, phase, rate = (*rest, *(line.words[0], "0", "omega_0")[len(rest) :])
                 phase, rate = self.values.number(line, phase), self.values.number(line, rate)
                 return self.values.number(line, value) * sympy.cos(rate * t + phase)
-            case [value]:
+            case [value] if value not in ("s", "noise"):
                 return self.values.law(line, value)
         raise line.error("the source is not understood. Known are: a value, {an expression of t}, dc, step, ac")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from shaftwork.core.errors import ModelFileError
@@ -18,6 +18,7 @@ ENDS = {"r": 2, "l": 2, "c": 2, "v": 2, "i": 2, "d": 2, "e": 4, "g": 4, "s": 4, 
 """How many nodes an element has behind its name, by its first letter."""
 ANALYSES = ("ac", "dc", "disto", "four", "measure", "meas", "noise", "op", "options", "option", "opt", "plot", "print")
 ANALYSES += ("probe", "pss", "pz", "save", "sens", "tf", "title", "width", "nodeset")
+ANALYSES += ("fft", "hb", "lin", "step")
 """Commands that change nothing in the circuit and its motion, which are left out."""
 
 
@@ -48,6 +49,12 @@ class Line:
     prefix: str = ""
     nodes: Mapping[str, str] = field(default_factory=dict)
     values: tuple[Mapping[str, str], ...] = ()
+
+    def in_scope(self, name: str) -> Iterator[str]:
+        """A name as it is in the subcircuit of this line, in that around it, and so on to the outermost."""
+        parts = self.prefix.lower().split(".")[:-1]
+        for count in range(len(parts), -1, -1):
+            yield ".".join((*parts[:count], name.lower()))
 
     @property
     def command(self) -> str:
@@ -104,7 +111,7 @@ def _plain_lines(text: str) -> Iterator[Line]:
     for number, row in enumerate(text.splitlines(), 1):
         content, _, drawing = row.partition(";")
         hints = [hint.strip() for hint in drawing.split(",")]
-        if content.strip() and content.strip()[0] not in "#%" and "ignore" not in hints and "nosim" not in hints:
+        if content.strip() and content.strip()[0] not in "#%*" and "nosim" not in hints:
             yield Line(number, content.strip(), tuple(_WORD.findall(content)))
 
 
@@ -137,16 +144,17 @@ def flattened(lines: tuple[Line, ...]) -> tuple[Line, ...]:
     Raises:
         LineError: a subcircuit is not there, does not end, has other nodes, or has too much in it.
     """
-    outer, definitions = _definitions(lines)
+    everywhere = {word.lower(): word.lower() for line in lines if line.command == ".global" for word in line.words[1:]}
+    outer, definitions = _definitions([line for line in lines if line.command != ".global"])
     flat: list[Line] = []
-    for line in _expanded(outer, definitions, 0):
+    for line in _expanded(outer, definitions, everywhere, 0):
         flat.append(line)
         if len(flat) > MOST_ELEMENTS:
             raise line.error(f"there are more than {MOST_ELEMENTS} elements, with those of subcircuits")
     return tuple(flat)
 
 
-def _definitions(lines: tuple[Line, ...]) -> tuple[list[Line], dict[str, Subcircuit]]:
+def _definitions(lines: list[Line]) -> tuple[list[Line], dict[str, Subcircuit]]:
     outer: list[Line] = []
     definitions: dict[str, Subcircuit] = {}
     inside: list[Line] = []
@@ -181,7 +189,9 @@ def _before_pairs(line: Line, start: int) -> tuple[tuple[str, ...], int]:
     return names, first
 
 
-def _expanded(lines: list[Line] | tuple[Line, ...], definitions: Mapping[str, Subcircuit], depth: int) -> Iterator[Line]:
+def _expanded(
+    lines: Sequence[Line], definitions: Mapping[str, Subcircuit], everywhere: Mapping[str, str], depth: int
+) -> Iterator[Line]:
     for line in lines:
         if line.command[0] != "x":
             yield line
@@ -196,7 +206,9 @@ def _expanded(lines: list[Line] | tuple[Line, ...], definitions: Mapping[str, Su
         if depth >= DEEPEST:
             raise line.error(f"subcircuits are inside each other more than {DEEPEST} times")
         prefix = f"{line.prefix}{line.words[0]}."
-        outside = dict(zip(definition.nodes, map(line.node, nodes), strict=True))
+        outside = {**everywhere, **dict(zip(definition.nodes, map(line.node, nodes), strict=True))}
         values = (*line.values, {**definition.values, **line.pairs(start)})
-        inner = [Line(one.number, one.text, one.words, prefix, outside, values) for one in definition.lines]
-        yield from _expanded(inner, definitions, depth + 1)
+        values += tuple(one.pairs(1) for one in definition.lines if one.command == ".param")  # each reads those before
+        lines = (one for one in definition.lines if one.command != ".param")
+        inner = [Line(one.number, one.text, one.words, prefix, outside, values) for one in lines]
+        yield from _expanded(inner, definitions, everywhere, depth + 1)

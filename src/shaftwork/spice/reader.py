@@ -9,6 +9,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
+from shaftwork.components.controlled import (
+    VoltageControlledCurrentSource,
+    VoltageControlledSwitch,
+    VoltageControlledVoltageSource,
+)
+from shaftwork.components.electrical import Resistor
 from shaftwork.core.errors import ModelFileError, ParameterError
 from shaftwork.core.parameters import in_si
 from shaftwork.network.netlist import REFERENCE, Placed, is_name
@@ -22,6 +28,10 @@ from shaftwork.spice.spice_numbers import Values
 Dialect = Literal["spice", "lcapy"]
 MOST_FAULTS = 8
 """Lines that an error lists; of more it says how many there are."""
+READING = (VoltageControlledVoltageSource, VoltageControlledCurrentSource, VoltageControlledSwitch)
+"""Parts whose last two ends let no current pass."""
+OPEN = 1e12
+"""Resistance in ohm of what is open."""
 BEFORE = -1e-12
 """Time in s at which what has always been so is read: a step of lcapy comes at zero."""
 
@@ -54,7 +64,7 @@ class SpiceCircuit:
         if self.from_rest:
             return dict(self.initial)
         model = self.network.compile(algebraic_loops=algebraic_loops)
-        return {**(model.steady_state(t=self.t_steady) if model.states else {}), **self.initial}
+        return {**(model.steady_state(t=self.t_steady) if model.states or model.form.waves else {}), **self.initial}
 
     def simulate(
         self, t_end: float | None = None, *, algebraic_loops: Literal["refuse", "solve"] = "refuse", **options: Any
@@ -150,10 +160,15 @@ class _Reader:
             self._attempt(line, devices.add)
         for line in (line for line in elements if self._kind(line) == "K"):
             self._attempt(line, devices.couple)
-        initial = {**devices.initial, **self._voltages(devices.placed)}
+        begins = self._lcapy or self._uic is not None  # otherwise SPICE begins in the steady state, whatever IC says
+        initial = {**devices.initial, **self._voltages(devices.placed)} if begins else {}
+        if self._start_voltages and not begins:
+            self._faults.append(self._start_voltages[0][0].error("without uic in .tran it holds a node, which is not read"))
         self._refuse()
+        if devices.placed and all(REFERENCE not in item.nodes for item in devices.placed):
+            raise ModelFileError("no element is at node 0, the reference. Join one to it.")
         network = Network(self._title if is_name(self._title) else title)
-        for item in _with_names(devices.placed):
+        for item in _with_names([*devices.placed, *_open_ends(devices.placed)]):
             network.add(item.part, *item.nodes)
         from_rest = self._uic is not None or (self._lcapy and bool(initial))
         t_steady = BEFORE if self._lcapy else 0.0
@@ -181,7 +196,7 @@ class _Reader:
         if command in ANALYSES:
             return
         match command:
-            case "param" | "params":
+            case "param" | "params" | "global_param":
                 for name, text in line.pairs(1).items():
                     value = self._values.number(line, text)
                     if name not in self._given:
@@ -198,7 +213,7 @@ class _Reader:
     def _model(self, line: Line) -> None:
         if len(line.words) < 3:
             raise line.error("a model has a name and a type")
-        self._models[line.words[1].lower()] = line, line.words[2].lower(), line.pairs(3)
+        self._models[f"{line.prefix}{line.words[1]}".lower()] = line, line.words[2].lower(), line.pairs(3)
 
     def _starts(self, line: Line) -> None:
         words = [word for word in line.words[1:] if word not in "(),"]
@@ -212,16 +227,14 @@ class _Reader:
         if "uic" in words:
             self._uic = line
         times = [self._values.number(line, word) for word in words if word != "uic"]
-        if not 2 <= len(times) <= 4 or not 0 < times[0] or not 0 < times[1]:
-            raise line.error("it is written .tran step end, both above zero, with uic to begin from rest")
+        if not 2 <= len(times) <= 4 or not (0 <= times[0] and 0 < times[1]):
+            raise line.error("it is written .tran step end, the end above zero, with uic to begin from rest")
         self._span = times[0], times[1]
 
     def _voltages(self, placed: list[Placed]) -> dict[str, float]:
         """Start voltages of capacitors between nodes whose voltages are given."""
         if not self._start_voltages:
             return {}
-        if self._uic is None:
-            self._faults.append(self._start_voltages[0][0].error("without uic in .tran it holds a node, which is not read"))
         voltages = {REFERENCE: 0.0}
         for line, node, text in self._start_voltages:
             self._attempt(line, lambda line, node=node, text=text: voltages.update({node: self._values.number(line, text)}))
@@ -235,7 +248,7 @@ class _Reader:
         Raises:
             ModelFileError: there is any; lists the lines.
         """
-        faults = [str(fault) for fault in sorted(self._faults, key=_line_number)]
+        faults = [*dict.fromkeys(map(str, sorted(self._faults, key=_line_number)))]
         if faults:
             rest = f"\n  and {len(faults) - MOST_FAULTS} lines more" if len(faults) > MOST_FAULTS else ""
             count = "a line is" if len(faults) == 1 else f"{len(faults)} lines are"
@@ -254,6 +267,14 @@ _FOLLOWERS = ("F", "H", "CCCS", "CCVS")
 
 def _line_number(fault: LineError) -> int:
     return int(str(fault).split()[1])
+
+
+def _open_ends(placed: list[Placed]) -> Iterator[Placed]:
+    """A resistor to the reference at each node that one element alone reaches: SPICE lets it be, a network does not."""
+    reached = Counter(node for item in placed for node in item.nodes[: 2 if isinstance(item.part, READING) else None])
+    for node in dict.fromkeys(node for item in placed for node in item.nodes):
+        if reached[node] < 2 and node != REFERENCE:
+            yield Placed(Resistor(f"open {node}", R=OPEN), (node, REFERENCE))
 
 
 def _with_names(placed: list[Placed]) -> Iterator[Placed]:

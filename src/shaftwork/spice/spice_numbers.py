@@ -15,11 +15,11 @@ from shaftwork.network.expressions import parse
 from shaftwork.spice.netlist_lines import Line
 
 SCALES = {"t": 1e12, "g": 1e9, "meg": 1e6, "k": 1e3, "mil": 25.4e-6, "m": 1e-3, "u": 1e-6, "µ": 1e-6, "μ": 1e-6}
-SCALES |= {"n": 1e-9, "p": 1e-12, "f": 1e-15, "a": 1e-18}
+SCALES |= {"n": 1e-9, "p": 1e-12, "f": 1e-15}
 """Suffixes of numbers, without case: a mega is "meg", a milli "m"."""
 _DIGITS = r"(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?"
-_NUMBER = re.compile(rf"([-+]?{_DIGITS})(meg|mil|[tgkmuµμnpfa])?[a-zµμ°Ω]*", re.IGNORECASE)
-_IN_TEXT = re.compile(rf"(?<![\w.])({_DIGITS})(meg|mil|[tgkmuµμnpfa])?\w*", re.IGNORECASE)
+_NUMBER = re.compile(rf"([-+]?{_DIGITS})(meg|mil|[tgkmuµμnpf])?[a-zµμ°Ω]*", re.IGNORECASE)
+_IN_TEXT = re.compile(rf"(?<![\w.])({_DIGITS})(meg|mil|[tgkmuµμnpf])?\w*", re.IGNORECASE)
 _NAME = re.compile(r"[A-Za-z_]\w*")
 FUNCTIONS = {"abs": "Abs", "max": "Max", "min": "Min", "u": "Heaviside", "H": "Heaviside", "sgn": "sign", "ln": "log"}
 """Functions of netlists that have another name in laws."""
@@ -68,7 +68,7 @@ class Values:
         return self._expression(line, text, tuple(reversed(line.values)))
 
     def _expression(self, line: Line, text: str, scopes: tuple[Mapping[str, str], ...]) -> Expr:
-        inner = text.strip().strip("{}'\"")
+        inner = text.strip().strip("{}'\"").strip()
         inner = inner if self._lcapy else _IN_TEXT.sub(_plain, inner.lower())
         inner = re.sub(r"\b([A-Za-z]+)\s*\(", lambda match: f"{FUNCTIONS.get(match[1], match[1])}(", inner)
         names = [name for name in dict.fromkeys(_NAME.findall(inner.replace("^", "**"))) if name != "t"]
@@ -77,7 +77,7 @@ class Values:
         try:
             law = parse(inner.replace("^", "**"), (t, *symbols.values()))
         except ModelFileError as error:
-            raise line.error(f"'{text}' cannot be read: {error}") from None
+            raise line.error(f"'{text}' cannot be read: {str(error).splitlines()[0]}") from None
         read = {symbol: self._parameter(line, name, scopes) for name, symbol in symbols.items() if law.has(symbol)}
         value: Expr = law.xreplace(read)
         if value.has(sympy.nan, sympy.oo, sympy.zoo, -sympy.oo, sympy.I) or value.free_symbols - {t}:

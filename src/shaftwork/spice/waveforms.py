@@ -15,6 +15,8 @@ from shaftwork.spice.netlist_lines import Line
 from shaftwork.spice.spice_numbers import Values
 
 WAVEFORMS = ("sin", "pulse", "pwl", "exp")
+SMALL = ("ac", "distof1", "distof2")
+"""What a source is in analyses of small motions, which is left out."""
 SHORTEST = 1e-9
 """Rise of a pulse in s where neither it nor the analysis says one."""
 MOST_PERIODS = 1000
@@ -32,21 +34,24 @@ def source_law(line: Line, values: Values, span: tuple[float, float]) -> Any:
     Raises:
         LineError: it has another form, or values that make no sense.
     """
-    words = [word for word in line.words[3:] if word not in "()"]
+    words = [word for word in line.words[3:] if word not in "()="]
     law: Any = 0.0
+    waves = (k for k, word in enumerate(words) if word.lower() in WAVEFORMS)
+    small = next((k for k in range(next(waves, len(words)), len(words)) if words[k].lower() in SMALL), len(words))
+    words = words[:small]
     while words:
         word = words.pop(0)
         match word.lower():
             case "dc" if words:
                 law = values.number(line, words.pop(0))
-            case "ac":
-                for _ in range(2):  # amplitude and phase, of small motions alone
-                    words = words[1:] if words and words[0].lower() not in ("dc", *WAVEFORMS) else words
+            case kind if kind in SMALL:
+                for _ in range(2):  # amplitude and phase
+                    words = words[1:] if words and words[0].lower() not in ("dc", *SMALL, *WAVEFORMS) else words
             case kind if kind in WAVEFORMS:
                 return _waveform(line, kind, [values.number(line, one) for one in words], span)
             case _:
                 law = values.law(line, word)
-                if words and words[0].lower() not in ("ac", "dc", *WAVEFORMS):
+                if words and words[0].lower() not in ("dc", *SMALL, *WAVEFORMS):
                     raise line.error(f"'{' '.join(words)}' is not understood. Known are: DC, AC, SIN, PULSE, PWL, EXP")
     return law
 

@@ -15,6 +15,7 @@ from shaftwork.codegen.array_form.recovery import BranchHistory
 from shaftwork.codegen.start_values import Start, at_rest
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.base import Component
+from shaftwork.components.controlled import LineSection, TransmissionLine
 from shaftwork.components.shaft_models import Lumped, Wave
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import AccuracyWarning, NetworkWarning, ParameterError
@@ -109,6 +110,8 @@ def twin(netlist: Netlist) -> Netlist:
     """
 
     def stiff(part: Component) -> Component:
+        if isinstance(part, TransmissionLine):
+            return LineSection(part.name, symbol=part.symbol, **part.values)
         if not isinstance(part, Shaft) or not isinstance(part.model, Wave):
             return part
         return dataclasses.replace(part, model=Lumped(1 if part.friction == 0 else 2))
