@@ -25,6 +25,7 @@ USES = {
     "drawing": "net.draw()",
     "analogues": "net.circuit().simulate(0.1)",
     "studies": "sw.studies.work_precision",
+    "spice": "net.to_spice()",
     "animation": "net.simulate(0.1).animate()",
     "spectra": "net.simulate(0.1).spectrum('shaft.tau')",
     "reporting": "sw.report(net, sections=['parts'])",

@@ -59,7 +59,7 @@ class VoltageControlledVoltageSource(Component):
 class VoltageControlledCurrentSource(Component):
     """A current from p through the source to n that follows the voltage from cp to cn.
 
-    Law: i = g (u_cp - u_cn), taken from p and delivered at n. With p at cp and n at cn it is a resistor 1 / g. SPICE: G.
+    Law: i = g (u_cp - u_cn), taken from p and delivered at n; a resistor 1 / g where p is cp and n is cn. SPICE: G.
     """
 
     g: float = parameter("S", "current over the voltage that it follows")
@@ -126,7 +126,7 @@ class VoltageControlledSwitch(Component):
     """A switch from p to n with a resistance in either mode, which follows the voltage from cp to cn with hysteresis.
 
     Law: u_p - u_n = R i with R_on from when u_cp - u_cn rises above u_t + u_h, and with R_off from when it falls below
-    u_t - u_h. A motion begins with the switch open, unless the voltage is above u_t + u_h. Modes: open, closed. SPICE: S.
+    u_t - u_h. A motion begins with it open, unless the voltage is above u_t + u_h. Modes: open, closed. SPICE: S.
     """
 
     R_on: float = parameter("ohm", "resistance while it is closed", above=0, default=1.0, latex=r"R_{on}")
@@ -177,7 +177,7 @@ class TransmissionLine(Component):
 
 
 class LineSection(TransmissionLine):
-    """One section of a line: an inductor between two capacitors. It stands and starts as the line does, without waves."""
+    """One section of a line, an inductor between two capacitors: it stands as the line does, without waves."""
 
     declared: ClassVar = TransmissionLine.declared
 

@@ -43,12 +43,12 @@ def deck(model: Model, t_end: float, step: float | None, initial: Any) -> str:
     end = in_si("t_end", t_end, "s", above=0)
     longest = end / STEPS if step is None else in_si("step", step, "s", above=0)
     if longest > end:
-        raise ParameterError(f"step = {longest:g} s is longer than t_end = {end:g} s. Leave it out for t_end / {STEPS}.")
+        raise ParameterError(
+            f"step = {longest:g} s is longer than t_end = {end:g} s. Leave it out for t_end / {STEPS}."
+        )
     form = model.form
     parts, problems = _smoothed(form)
-    elements = Elements(
-        form.graph, parts, form.tree.redundant, _stored(model, initial), end, EDGE * longest
-    )
+    elements = Elements(form.graph, parts, form.tree.redundant, _stored(model, initial), end, EDGE * longest)
     lines: list[str] = []
     for part in form.graph.parts:
         try:
@@ -75,7 +75,9 @@ def _smoothed(form: StateForm) -> tuple[dict[str, SmoothedPart], list[Diagnostic
 
 def _problem(part: GraphPart, error: NoSpiceFormError, form: StateForm) -> Diagnostic:
     nodes = tuple(form.graph.node_name(number) for number in part.nodes.values())
-    hint = "Leave the part out, or take one with smooth laws: a contact with a stiffness c, a brake that is on from t_on."
+    hint = (
+        "Leave the part out, or take one with smooth laws: a contact with a stiffness c, a brake that is on from t_on."
+    )
     return Diagnostic("no SPICE form", f"{title(part.component)}: {error}.", hint, (part.name,), nodes)
 
 
@@ -126,7 +128,11 @@ def _rest(elements: Elements) -> Iterator[str]:
 def _clocks(elements: Elements) -> Iterator[str]:
     lines = [*elements.clocks()]
     if lines:
-        yield from ("", "* Switches from 0 to 1 at a time, and corners where laws bend: steps of ngspice end there", *lines)
+        yield from (
+            "",
+            "* Switches from 0 to 1 at a time, and corners where laws bend: steps of ngspice end there",
+            *lines,
+        )
 
 
 def _analysis(elements: Elements, form: StateForm, t_end: float, step: float) -> Iterator[str]:

@@ -159,7 +159,9 @@ class Devices:
             raise line.error("it has four nodes and a gain; other forms, as POLY and VALUE, are not read")
         gain = self.values.number(line, line.words[5])
         part = VoltageControlledVoltageSource(name, gain=gain)
-        self.place(part if line.command[0] == "e" else VoltageControlledCurrentSource(name, g=gain), *self._ends(line, 4))
+        self.place(
+            part if line.command[0] == "e" else VoltageControlledCurrentSource(name, g=gain), *self._ends(line, 4)
+        )
 
     def _following(self, line: Line, name: str) -> None:
         if len(line.words) != 5:
@@ -229,8 +231,8 @@ class Devices:
         if flags not in ([], ["off"]):
             raise line.error(f"'{' '.join(flags)}' is not read: a switch begins as its voltage has it, or open")
         model = self._model(line, line.words[5], "sw", {"vt": 0.0, "vh": 0.0, "ron": 1.0, "roff": 1e12})
-        resistances = {"R_on": model["ron"], "R_off": model["roff"]}
-        part = VoltageControlledSwitch(name, u_t=model["vt"], u_h=model["vh"], **resistances)
+        closed, opened, threshold, hysteresis = (model[key] for key in ("ron", "roff", "vt", "vh"))
+        part = VoltageControlledSwitch(name, R_on=closed, R_off=opened, u_t=threshold, u_h=hysteresis)
         self.place(part, *self._ends(line, 4))
 
     def couple(self, line: Line) -> None:

@@ -15,7 +15,24 @@ from shaftwork.components.laws import t
 from shaftwork.spice.devices import Devices
 from shaftwork.spice.netlist_lines import Line
 
-LONG_NAMES = ("TF", "SW", "NR", "AM", "VM", "GY", "TP", "TL", "TR", "RL", "CPE", "REL", "BAT", "FB", "VCVS", "VCCS")
+LONG_NAMES: tuple[str, ...] = (
+    "TF",
+    "SW",
+    "NR",
+    "AM",
+    "VM",
+    "GY",
+    "TP",
+    "TL",
+    "TR",
+    "RL",
+    "CPE",
+    "REL",
+    "BAT",
+    "FB",
+    "VCVS",
+    "VCCS",
+)
 LONG_NAMES += ("CCCS", "CCVS", "Cable", "ANT", "SP", "BL", "MX", "XT", "MISC", "MT", "ADC", "DAC", "RV", "TV", "FS")
 DRAWN = ("A", "O", "P", "VM")
 """What is drawn, and lets no current pass."""
@@ -119,9 +136,9 @@ class LcapyDevices(Devices):
                 value = self.values.number(line, rest[0] if rest else line.words[0])
                 return value if kind == "dc" else Piecewise((0, t < 0), (value, True))
             case ["ac", *rest] if len(rest) < 4:
-                value, phase, rate = (*rest, *(line.words[0], "0", "omega_0")[len(rest) :])
-                phase, rate = self.values.number(line, phase), self.values.number(line, rate)
-                return self.values.number(line, value) * sympy.cos(rate * t + phase)
+                by_default = (line.words[0], "0", "omega_0")
+                amplitude, angle, speed = (self.values.number(line, word) for word in (*rest, *by_default[len(rest) :]))
+                return amplitude * sympy.cos(speed * t + angle)
             case [value] if value not in ("s", "noise"):
                 return self.values.law(line, value)
         raise line.error("the source is not understood. Known are: a value, {an expression of t}, dc, step, ac")

@@ -16,7 +16,21 @@ _WORD = re.compile(r"\{[^{}]*\}|'[^']*'|\"[^\"]*\"|[^\s(),={}'\"]+|[=(){}'\"]")
 _ELEMENT = re.compile(r"[rlcvi]\w*\s+\S+\s+\S+\s+(?:dc\s+)?[-+.\d]\S*$", re.IGNORECASE)
 ENDS = {"r": 2, "l": 2, "c": 2, "v": 2, "i": 2, "d": 2, "e": 4, "g": 4, "s": 4, "t": 4, "f": 2, "h": 2, "k": 0}
 """How many nodes an element has behind its name, by its first letter."""
-ANALYSES = ("ac", "dc", "disto", "four", "measure", "meas", "noise", "op", "options", "option", "opt", "plot", "print")
+ANALYSES: tuple[str, ...] = (
+    "ac",
+    "dc",
+    "disto",
+    "four",
+    "measure",
+    "meas",
+    "noise",
+    "op",
+    "options",
+    "option",
+    "opt",
+    "plot",
+    "print",
+)
 ANALYSES += ("probe", "pss", "pz", "save", "sens", "tf", "title", "width", "nodeset")
 ANALYSES += ("fft", "hb", "lin", "step")
 """Commands that change nothing in the circuit and its motion, which are left out."""
@@ -118,7 +132,9 @@ def _plain_lines(text: str) -> Iterator[Line]:
 def _spice_lines(text: str) -> Iterator[Line]:
     rows = text.splitlines()
     if rows and _ELEMENT.match(rows[0].strip()):
-        raise Line(1, rows[0].strip(), ("",)).error("the first line of SPICE is its title, not an element. Add one above")
+        raise Line(1, rows[0].strip(), ("",)).error(
+            "the first line of SPICE is its title, not an element. Add one above"
+        )
     joined: list[tuple[int, str]] = []
     for number, row in enumerate(rows[1:], 2):
         content = re.split(r";|\s\$\s|\s//\s", row)[0].strip()
@@ -209,6 +225,6 @@ def _expanded(
         outside = {**everywhere, **dict(zip(definition.nodes, map(line.node, nodes), strict=True))}
         values = (*line.values, {**definition.values, **line.pairs(start)})
         values += tuple(one.pairs(1) for one in definition.lines if one.command == ".param")  # each reads those before
-        lines = (one for one in definition.lines if one.command != ".param")
-        inner = [Line(one.number, one.text, one.words, prefix, outside, values) for one in lines]
+        circuit = (one for one in definition.lines if one.command != ".param")
+        inner = [Line(one.number, one.text, one.words, prefix, outside, values) for one in circuit]
         yield from _expanded(inner, definitions, everywhere, depth + 1)

@@ -14,7 +14,7 @@ from shaftwork.components.controlled import (
     VoltageControlledSwitch,
     VoltageControlledVoltageSource,
 )
-from shaftwork.components.electrical import Resistor
+from shaftwork.components.electrical import Capacitor, Resistor
 from shaftwork.core.errors import ModelFileError, ParameterError
 from shaftwork.core.parameters import in_si
 from shaftwork.network.netlist import REFERENCE, Placed, is_name
@@ -163,7 +163,9 @@ class _Reader:
         begins = self._lcapy or self._uic is not None  # otherwise SPICE begins in the steady state, whatever IC says
         initial = {**devices.initial, **self._voltages(devices.placed)} if begins else {}
         if self._start_voltages and not begins:
-            self._faults.append(self._start_voltages[0][0].error("without uic in .tran it holds a node, which is not read"))
+            self._faults.append(
+                self._start_voltages[0][0].error("without uic in .tran it holds a node, which is not read")
+            )
         self._refuse()
         if devices.placed and all(REFERENCE not in item.nodes for item in devices.placed):
             raise ModelFileError("no element is at node 0, the reference. Join one to it.")
@@ -217,7 +219,9 @@ class _Reader:
 
     def _starts(self, line: Line) -> None:
         words = [word for word in line.words[1:] if word not in "(),"]
-        if len(words) % 4 or any(group[0].lower() != "v" or group[2] != "=" for group in zip(*[iter(words)] * 4)):
+        if len(words) % 4 or any(
+            group[0].lower() != "v" or group[2] != "=" for group in zip(*[iter(words)] * 4, strict=True)
+        ):
             raise line.error("start values are written .ic V(node)=value")
         for _, node, _, value in zip(*[iter(words)] * 4, strict=True):
             self._start_voltages.append((line, line.node(node), value))
@@ -227,7 +231,7 @@ class _Reader:
         if "uic" in words:
             self._uic = line
         times = [self._values.number(line, word) for word in words if word != "uic"]
-        if not 2 <= len(times) <= 4 or not (0 <= times[0] and 0 < times[1]):
+        if not 2 <= len(times) <= 4 or min(times) < 0 or not times[1]:
             raise line.error("it is written .tran step end, the end above zero, with uic to begin from rest")
         self._span = times[0], times[1]
 
@@ -237,10 +241,16 @@ class _Reader:
             return {}
         voltages = {REFERENCE: 0.0}
         for line, node, text in self._start_voltages:
-            self._attempt(line, lambda line, node=node, text=text: voltages.update({node: self._values.number(line, text)}))
-        capacitors = (item for item in placed if type(item.part).__name__ == "Capacitor")
-        ends = ((item.part.name, voltages.get(item.nodes[0], 0.0) - voltages.get(item.nodes[1], 0.0)) for item in capacitors)
-        return {f"{name}.u": voltage for name, voltage in ends if voltage}
+            try:
+                voltages[node] = self._values.number(line, text)
+            except LineError as error:
+                self._faults.append(error)
+        initial: dict[str, float] = {}
+        for item in placed:
+            if isinstance(item.part, Capacitor):
+                first, second = (voltages.get(node, 0.0) for node in item.nodes)
+                initial |= {f"{item.part.name}.u": first - second} if first != second else {}
+        return initial
 
     def _refuse(self) -> None:
         """Refuse what was not understood.
@@ -282,5 +292,3 @@ def _with_names(placed: list[Placed]) -> Iterator[Placed]:
     names = {item.part.name for item in placed}  # only asked for membership
     for item in placed:
         yield replace(item, nodes=tuple(f"{node} node" if node in names else node for node in item.nodes))
-
-

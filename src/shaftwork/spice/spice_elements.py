@@ -83,9 +83,9 @@ class Elements:
         for branch in lines:
             yield from self._of_branch(branch, smoothed.laws.get(branch.index))
         for law, plus, minus in smoothed.added:
-            label = self._labels.of("element", name)
-            law = self._of_time(self._in_numbers(law, self._parameters(name)))
-            yield f"B{label} {self.node(plus)} {self.node(minus)} I = {self._printed(law, plus, minus, {})}"
+            label, numbers = self._labels.of("element", name), self._parameters(name)
+            text = self._printed(self._of_time(self._in_numbers(law, numbers)), plus, minus, {})
+            yield f"B{label} {self.node(plus)} {self.node(minus)} I = {text}"
 
     def rest(self) -> Iterator[str]:
         """The lines of what laws read besides voltages and currents: angles and rates."""
@@ -239,8 +239,8 @@ class Elements:
         return self._graph.parts[branch.part].name
 
     def _parameters(self, name: str) -> Mapping[str, float]:
-        start = f"{name}."
-        return {key.removeprefix(start): value for key, value in self._graph.parameters.items() if key.startswith(start)}
+        owners = ((*key.rpartition("."), value) for key, value in self._graph.parameters.items())
+        return {parameter: value for owner, _, parameter, value in owners if owner == name}
 
     def _in_numbers(self, law: Expr, numbers: Mapping[str, float]) -> Expr:
         values = {symbol: Float(numbers[symbol.name]) for symbol in law.free_symbols if symbol.name in numbers}

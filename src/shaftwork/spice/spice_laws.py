@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from functools import reduce
 from itertools import pairwise
 from typing import Any
 
@@ -23,7 +24,7 @@ LONGEST_PRODUCT = 6
 LARGEST_POWER = 600
 """Exponents in pieces of a law that are switched off: what is infinite is no number when it is multiplied by zero."""
 NUMBERS, MOST_NUMBERS = 20, 20_000
-"""Points of a table for each whole number of smooth noise, which is off by 1e-3 between them; and how many there may be."""
+"""Points of a table for each whole number of smooth noise, which is off by 1e-3 between them; and the most of them."""
 SAME_NAME = ("Abs", "acos", "asin", "atan", "cos", "cosh", "exp", "sin", "sinh", "sqrt", "tan", "tanh", "floor")
 
 
@@ -86,10 +87,8 @@ class _SpicePrinter(StrPrinter):  # type: ignore[misc]
         return self._folded("min", least.args)
 
     def _folded(self, function: str, args: Sequence[Any]) -> str:
-        first, *rest = map(self._print, args)
-        for other in rest:
-            first = f"{function}({first}, {other})"
-        return first
+        text: str = reduce(lambda first, other: f"{function}({first}, {other})", map(self._print, args))
+        return text
 
     def _print_Heaviside(self, step: Any) -> str:
         argument = self._print(step.args[0])
@@ -111,7 +110,8 @@ class _SpicePrinter(StrPrinter):  # type: ignore[misc]
         name = type(function).__name__
         if name not in SAME_NAME:
             raise NoSpiceFormError(f"a law has the function {name}, which ngspice does not have")
-        return f"{name.lower()}({', '.join(map(self._print, function.args))})"
+        arguments = ", ".join(map(self._print, function.args))
+        return f"{name.lower()}({arguments})"
 
     _print_Abs = _print_Function
     _print_floor = _print_Function
@@ -181,8 +181,9 @@ def _weight(condition: Any, switched: Callable[[Any], Expr | None]) -> Expr | No
         return sympy.Integer(int(bool(condition)))
     if isinstance(condition, Relational):
         return switched(condition)
-    weights = [_weight(one, switched) for one in condition.args]
-    if None in weights:
+    optional = [_weight(one, switched) for one in condition.args]
+    weights = [weight for weight in optional if weight is not None]
+    if len(weights) < len(optional):
         return None
     match condition:
         case sympy.And():
