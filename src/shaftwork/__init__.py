@@ -14,6 +14,7 @@ if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
         reduce as reduce,
         scenes as scenes,
         sizing as sizing,
+        spice as spice,
         studies as studies,
         torsional as torsional,
     )
@@ -42,6 +43,7 @@ if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
     from shaftwork.components.bucket_wheel import *
     from shaftwork.components.contacts import *
     from shaftwork.components.controllers import *
+    from shaftwork.components.controlled import *
     from shaftwork.components.sources import *
     from shaftwork.components.excitations import *
     from shaftwork.components.harmonics import Harmonics as Harmonics
@@ -166,7 +168,7 @@ _HOME = {
     "shaftwork.results.solution": ("Solution",),
     "shaftwork.torsional.calculation": ("torsional_calculation",),
 }
-_PACKAGES = ("live", "reduce", "scenes", "sizing", "studies", "torsional")
+_PACKAGES = ("live", "reduce", "scenes", "sizing", "spice", "studies", "torsional")
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 
 

@@ -26,6 +26,7 @@ USES = {
     "analogues": "net.circuit().simulate(0.1)",
     "control": "net.compile().linearize().to_scipy()",
     "studies": "sw.studies.work_precision",
+    "spice": "net.to_spice()",
     "animation": "net.simulate(0.1).animate()",
     "spectra": "net.simulate(0.1).spectrum('shaft.tau')",
     "reporting": "sw.report(net, sections=['parts'])",

@@ -20,6 +20,7 @@ FAMILIES = (
     "motors",
     "drives",
     "electrical",
+    "controlled",
     "bldc",
 )
 """The modules of components, in the order in which they are shown."""

@@ -216,9 +216,11 @@ def _rank(graph: CircuitGraph, branch: GraphBranch) -> tuple[Kind, int]:
     """By what branches come into the tree: gears before what holds by a mode, which carries nothing beside them.
 
     Of that, gears that rub come first: beside a friction which takes all, no torque in their teeth would tell whether
-    they hold.
+    they hold. The resistance within a controlled source comes last of all: others fix the node that it follows.
     """
     kind, modes = branch.template.kind, graph.parts[branch.part].modes
+    if kind is Kind.CONDUCTANCE:
+        return kind, int(any(graph.branches[k].template.through for k in graph.parts[branch.part].branches))
     if kind is not Kind.COUPLING or not modes:
         return kind, 0
     return kind, 1 if any(element.passes_on for element in modes) else 2

@@ -290,6 +290,21 @@ class Network(NetworkBuilder):
         network.analogy = analogy
         return network
 
+    def to_spice(self, t_end: float = 1.0, *, step: float | None = None, initial: Point = None) -> str:
+        """The analogue circuit as a deck for ngspice: speeds are voltages, torques currents, modes smooth laws.
+
+        Args:
+            t_end: end of the motion, s.
+            step: longest step of ngspice, s; by default a 2000th of the motion.
+            initial: start values, as for `Model.simulate`.
+
+        Raises:
+            NetworkError: the network cannot be assembled, or a part has no form in SPICE, as rigid contacts.
+        """
+        from shaftwork.spice.deck import deck
+
+        return deck(self.compile(), t_end, step, initial)
+
     def draw(
         self,
         *,

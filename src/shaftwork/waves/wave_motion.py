@@ -15,6 +15,7 @@ from shaftwork.codegen.array_form.recovery import BranchHistory
 from shaftwork.codegen.start_values import Start, at_rest
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.base import Component
+from shaftwork.components.controlled import LineSection, TransmissionLine
 from shaftwork.components.shaft_models import Lumped, Wave
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import AccuracyWarning, NetworkWarning, ParameterError
@@ -109,6 +110,8 @@ def twin(netlist: Netlist) -> Netlist:
     """
 
     def stiff(part: Component) -> Component:
+        if isinstance(part, TransmissionLine):
+            return LineSection(part.name, symbol=part.symbol, **part.values)
         if not isinstance(part, Shaft) or not isinstance(part.model, Wave):
             return part
         return dataclasses.replace(part, model=Lumped(1 if part.friction == 0 else 2))
@@ -264,7 +267,7 @@ def _warn_of_friction(bound: BoundArrays, impedances: Array) -> None:
     parts = [form.graph.part_of(end) for end in form.waves[::2]]
     for part, impedance in {part.name: (part, Z) for part, Z in zip(parts, impedances, strict=True)}.values():
         value = {name: float(bound.p[place]) for name, place in part.parameters.items()}
-        share = value.get("friction", 0.0) * value["length"] / float(impedance)
+        share = value.get("friction", 0.0) * value.get("length", 0.0) / float(impedance)
         if share > LIGHT:
             warn(
                 f"Shaft '{part.name}': its bearing friction d' L is {share:.2g} of its wave impedance, and Wave() "

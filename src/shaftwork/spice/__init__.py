@@ -1,0 +1,12 @@
+"""SPICE: networks as circuits that ngspice runs, and circuits of others as networks.
+
+`deck` writes: `spice_elements` has an element for each branch, `smoothed_modes` a law in place of modes, `spice_laws`
+expressions as ngspice reads them. `reader` reads: `netlist_lines` splits a text into lines, `devices` makes parts of
+them, `waveforms` laws of sources, `lcapy_lines` what lcapy writes otherwise.
+"""
+
+from __future__ import annotations
+
+from shaftwork.spice.reader import SpiceCircuit, read
+
+__all__ = ["SpiceCircuit", "read"]
