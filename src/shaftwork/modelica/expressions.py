@@ -51,6 +51,7 @@ class Printer(RealNumbers, CodePrinter):  # type: ignore[misc]
     """
 
     language = "Modelica"
+    printmethod = "_modelica"
     settings: Mapping[str, Any] = MappingProxyType({"order": "none"})
     _operators = MappingProxyType({"and": "and", "or": "or", "not": "not"})
 

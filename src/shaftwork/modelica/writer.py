@@ -7,7 +7,7 @@ from importlib.resources import files
 from typing import Any
 
 from shaftwork.core.domains import ROTATION, Domain
-from shaftwork.core.errors import CompileError, ParameterError
+from shaftwork.core.errors import CompileError
 from shaftwork.formulation.form import StateForm
 from shaftwork.modelica.expressions import INTERPOLATE, Identifiers, number, quoted
 from shaftwork.modelica.mode_models import part_model
@@ -19,20 +19,19 @@ LIBRARY = "library.mo"
 """The classes of the Modelica Standard Library that are used, written anew, for tools that have no library."""
 
 
-def component_text(form: StateForm, *, inline: bool, t_end: float, initial: Mapping[str, float]) -> str:
+def component_text(form: StateForm, *, inline: bool, t_end: float, start: Mapping[str, float]) -> str:
     """The package of a network.
 
     Args:
         form: the state form of the network.
         inline: whether the classes of the library are written into the package.
         t_end: end of the experiment, s.
-        initial: start values of stores, "J1.omega".
+        start: of each state by name.
 
     Raises:
-        CompileError: a part or a law has no counterpart; names all such parts.
-        ParameterError: a start value is of no store that is a state.
+        CompileError: a part, a law or a start value has no counterpart; names all such parts.
     """
-    work = _Writer(form, inline, initial)
+    work = _Writer(form, inline, start)
     lines, joints = work.instances(), work.connections()
     work.refuse()
     package = Identifiers()[form.graph.name]
@@ -63,9 +62,9 @@ def experiment(t_end: float) -> str:
 class _Writer:
     """Goes through the parts and collects instances, terminals at nodes, models and what cannot be written."""
 
-    def __init__(self, form: StateForm, inline: bool, initial: Mapping[str, float]) -> None:
-        self._form, self._graph, self._inline = form, form.graph, inline
-        self._initial, self._used = initial, set[str]()  # only asked for membership
+    def __init__(self, form: StateForm, inline: bool, start: Mapping[str, float]) -> None:
+        self._form, self._graph, self._inline, self._start = form, form.graph, inline, start
+        self._begun: list[str] = []
         self._names = Identifiers()
         self._terminals: dict[tuple[int, Domain], list[str]] = {}
         self._frames: dict[Domain, str] = {}
@@ -91,11 +90,10 @@ class _Writer:
         """Raise the error of what cannot be written, if there is any."""
         if self._faults:
             raise CompileError(f"'{self._graph.name}' has no Modelica form: {' '.join(self._faults)}")
-        if strange := [name for name in self._initial if name not in self._used]:
-            stores = [state.name for state in self._form.states if state.kind != "integral"]
-            raise ParameterError(
-                f"initial: {strange[0]!r} is the start value of no state of a store that has one in Modelica. There "
-                f"are: {', '.join(stores)}."
+        if others := [name for name, value in self._start.items() if value and name not in self._begun]:
+            raise CompileError(
+                f"'{self._graph.name}': the start value of {others[0]} has no place in an instance of its part. Start "
+                "with speeds, currents and voltages alone, or take the form 'flat'."
             )
 
     def _instance(self, part: GraphPart) -> Iterator[str]:
@@ -142,8 +140,8 @@ class _Writer:
         stores = [branch for branch in part.branches if branch in states]
         if stores and standard.starts:
             name = next(state.name for state in self._form.states if state.branch == stores[0])
-            self._used.add(name)
-            starts = dict.fromkeys(standard.starts, 0.0) | {standard.starts[0]: self._initial.get(name, 0.0)}
+            self._begun.append(name)
+            starts = dict.fromkeys(standard.starts, 0.0) | {standard.starts[0]: self._start[name]}
             pairs += [f"{key}(start = {number(start)}, fixed = true)" for key, start in starts.items()]
         return ", ".join(pairs)
 
