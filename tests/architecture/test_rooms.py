@@ -24,6 +24,7 @@ USES = {
     "sizing": "sw.sizing.duty",
     "drawing": "net.draw()",
     "analogues": "net.circuit().simulate(0.1)",
+    "modelica": "net.to_modelica()",
     "studies": "sw.studies.work_precision",
     "animation": "net.simulate(0.1).animate()",
     "spectra": "net.simulate(0.1).spectrum('shaft.tau')",

@@ -17,9 +17,9 @@ from shaftwork.components.modes import Mode, ModeChoice, Modes
 from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import CompileError
 from shaftwork.formulation.form import StateForm
-from shaftwork.modelica.expressions import Printer
+from shaftwork.modelica.indexed_rows import difference
+from shaftwork.modelica.modelica_expressions import Printer
 from shaftwork.modelica.part_models import PartModel
-from shaftwork.modelica.rows import difference
 from shaftwork.network.graph import GraphPart, resolve
 from shaftwork.network.kinds import Kind
 from shaftwork.network.templates import BranchTemplate, make_template
@@ -130,7 +130,10 @@ class _FrictionModel(_ModeModel):
         self.equations += [
             f"speed = {self.across};",
             "acceleration = der(speed);",
-            *(f"slip_{side} = {self.law(self._torque(self.modes[side]), 'speed')};" for side in ("forward", "backward")),
+            *(
+                f"slip_{side} = {self.law(self._torque(self.modes[side]), 'speed')};"
+                for side in ("forward", "backward")
+            ),
             *(f"most_{side} = {self.law(self._limit(side), 'speed')};" for side in ("forward", "backward")),
             "start_forward = pre(mode) == 0 and (s > most_forward or pre(start_forward) and s > slip_forward)",
             "  or initial() and speed > 0;",
@@ -225,5 +228,3 @@ class _SwitchModel(_ModeModel):
             "current = if closed then s else Goff * s;",
         ]
         self.give("current")
-
-

@@ -10,8 +10,8 @@ from sympy import Expr, Symbol
 from shaftwork.components.branches import ACROSS, INTEGRAL, RATE, End, named_in
 from shaftwork.core.domains import ELECTRICAL, ROTATION, TRANSLATION, Domain
 from shaftwork.formulation.form import StateForm
-from shaftwork.modelica.expressions import Identifiers, Printer, quoted, symbols_of, unit
-from shaftwork.modelica.rows import FEW, Group, Place, difference, family, groups_of, runs_of, total
+from shaftwork.modelica.indexed_rows import FEW, Group, Place, difference, family, groups_of, runs_of, total
+from shaftwork.modelica.modelica_expressions import Identifiers, Printer, quoted, symbols_of, unit
 from shaftwork.modelica.standard_classes import CONNECTORS
 from shaftwork.network.graph import GROUND, GraphBranch, GraphPart, signals_of
 from shaftwork.network.kinds import Kind
@@ -68,7 +68,7 @@ class PartModel:
             self._write_law(group, throughs)
         self._balance(groups, throughs)
 
-    def declare(self, name: str, measure: str, start: bool = False, size: int = 0) -> None:
+    def declare(self, name: str, measure: str, *, start: bool = False, size: int = 0) -> None:
         """A variable or an array, which begins at zero where it is a state."""
         each = "each " if size else ""
         begins = f"{each}start = 0, {each}fixed = true, " if start else ""
@@ -134,7 +134,7 @@ class PartModel:
                 self.equations.append(f"{place.text()} = der({self.angle_at(end)});")
         for name, ends in arrays.items():
             size = max(self.places[end].number for end in ends)
-            self.declare(name, self.domains[ends[0]].across.unit, all(map(self._is_state, ends)), size)
+            self.declare(name, self.domains[ends[0]].across.unit, start=all(map(self._is_state, ends)), size=size)
 
     def _is_state(self, end: End) -> bool:
         """Whether the across variable of an end is that of a store of this part that is a state."""
@@ -152,7 +152,7 @@ class PartModel:
             stem = family(label)[0].rstrip("_") if label and size > 1 else stem
             name = self.names.unused(stem)
             size = size if size > 1 else 0
-            self.declare(name, quantity.unit, branch.index in self.form.through_states, size)
+            self.declare(name, quantity.unit, start=branch.index in self.form.through_states, size=size)
             throughs |= {one.index: Place(name, k if size else 0) for k, one in enumerate(group.branches, 1)}
         return throughs
 

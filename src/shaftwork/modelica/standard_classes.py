@@ -43,7 +43,7 @@ class StandardClass:
     starts: tuple[str, ...] = ()
 
 
-def _compliant(prefix: str, damped: bool) -> StandardClass:
+def _compliant(prefix: str, *, damped: bool) -> StandardClass:
     values = {"c": "c", "d": "d"} if damped else {"c": "c"}
     return StandardClass(f"{prefix}.Components.{'SpringDamper' if damped else 'Spring'}", values, FLANGES)
 

@@ -364,7 +364,7 @@ class Network(NetworkBuilder):
             CompileError: a part or a law has no such form; the message names it.
             ParameterError: there is no such form or library, or the file cannot be written.
         """
-        from shaftwork.modelica.export import modelica_text, write_text
+        from shaftwork.modelica.modelica_export import modelica_text, write_text
 
         text = modelica_text(self.netlist(), sound, form, library, t_end, initial)
         if path is not None:

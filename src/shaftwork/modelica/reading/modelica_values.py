@@ -11,7 +11,8 @@ import sympy
 from shaftwork.components.laws import larger, smaller
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ModelFileError
-from shaftwork.modelica.syntax import Term, fault
+from shaftwork.modelica.reading.modelica_syntax import Term
+from shaftwork.modelica.reading.modelica_tokens import fault
 
 _CONSTANTS = {"pi": math.pi, "eps": 2.220446049250313e-16, "small": 1e-60, "inf": 1e60, "g_n": 9.80665, "e": math.e}
 _D2R = {"D2R": math.pi / 180, "R2D": 180 / math.pi}
@@ -61,7 +62,7 @@ class Values:
         except (ArithmeticError, TypeError, ValueError, RecursionError) as error:
             if isinstance(error, ModelFileError):
                 raise
-            fault(term.line, f"the expression has no value: {str(error)[:80] or type(error).__name__}.")
+            raise fault(term.line, f"the expression has no value: {str(error)[:80] or type(error).__name__}.") from None
 
     def _plain(self, value: Any, term: Term) -> Any:
         if isinstance(value, bool | str | list):
@@ -70,12 +71,12 @@ class Values:
         if expression in (sympy.true, sympy.false):
             return bool(expression)
         if expression.has(sympy.nan, sympy.zoo, sympy.oo, sympy.I, -sympy.oo):
-            fault(term.line, "the expression has no finite real value.")
+            raise fault(term.line, "the expression has no finite real value.")
         if expression.free_symbols:
             return expression
         number = float(expression)
         if abs(number) > LARGEST:
-            fault(term.line, f"the number {number:g} is too large.")
+            raise fault(term.line, f"the number {number:g} is too large.")
         return number
 
     def _value(self, term: Term) -> Any:
@@ -104,7 +105,7 @@ class Values:
                 return -one
             case "not", [one]:
                 return sympy.Not(one)
-            case ("and" | "or"), [one, other]:
+            case (("and" | "or"), [one, other]):
                 return (sympy.And if term.kind == "and" else sympy.Or)(one, other)
             case "+", [one, other]:
                 return one + other
@@ -116,7 +117,7 @@ class Values:
                 return one / other
             case "^", [one, other]:
                 return one**other
-        fault(term.line, "the expression is not one of numbers, parameters and time.")
+        raise fault(term.line, "the expression is not one of numbers, parameters and time.")
 
     def _choice(self, term: Term) -> Any:
         condition, *branches = term.parts
@@ -129,7 +130,7 @@ class Values:
     def _call(self, term: Term, values: list[Any]) -> Any:
         name = term.value.rpartition(".")[2]
         if name not in _FUNCTIONS:
-            fault(term.line, f"the function '{term.value}' is not read. There are: {', '.join(_FUNCTIONS)}.")
+            raise fault(term.line, f"the function '{term.value}' is not read. There are: {', '.join(_FUNCTIONS)}.")
         return _FUNCTIONS[name](*values)
 
     def _named(self, term: Term) -> Any:
@@ -141,9 +142,9 @@ class Values:
         if name in self._terms:
             value = self._terms[name]
             if value is None:
-                fault(term.line, f"the parameter '{name}' has no value.")
+                raise fault(term.line, f"the parameter '{name}' has no value.")
             if name in self._open:
-                fault(term.line, f"the parameter '{name}' is its own value.")
+                raise fault(term.line, f"the parameter '{name}' is its own value.")
             self._open.append(name)
             self._results[name] = self.of(value)
             self._open.pop()
@@ -152,4 +153,4 @@ class Values:
         for table, places in ((_CONSTANTS, ("Constants",)), (_D2R, ("Constants", "Conversions"))):
             if last in table and (set(places) & set(name.split(".")) or last == name == "pi"):
                 return table[last]
-        fault(term.line, f"there is no parameter '{name}'. There are: {', '.join(self._terms) or 'none'}.")
+        raise fault(term.line, f"there is no parameter '{name}'. There are: {', '.join(self._terms) or 'none'}.")

@@ -17,12 +17,18 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError
 
 KEYWORDS = frozenset(
-    "algorithm and annotation assert block break class connect connector constant constrainedby der discrete each else "
-    "elseif elsewhen encapsulated end enumeration equation expandable extends external false final flow for function "
-    "if import impure in initial inner input loop model not operator or outer output package parameter partial "
-    "protected public pure record redeclare replaceable return stream then true type when while within "
-    "time Real Integer Boolean String Modelica Network interpolate".split()
+    re.findall(
+        r"\w+",
+        "algorithm and annotation assert block break class connect connector constant constrainedby der discrete "
+        "each else elseif elsewhen encapsulated end enumeration equation expandable extends external false final "
+        "flow for function if import impure in initial inner input loop model not operator or outer output package "
+        "parameter partial protected public pure record redeclare replaceable return stream then true type when "
+        "while within time abs sign sqrt div mod rem ceil floor integer sin cos tan asin acos atan atan2 sinh cosh "
+        "tanh exp log log10 pre edge change delay sample size ndims zeros ones fill identity transpose sum product "
+        "min max homotopy smooth noEvent terminal reinit Real Integer Boolean String Modelica Network interpolate ",
+    )
 )
+"""Words that name nothing else."""
 INTERPOLATE = """  function interpolate "Straight lines between points, constant beyond their ends"
     input Real x[:] "Arguments, ascending";
     input Real y[:] "Values";

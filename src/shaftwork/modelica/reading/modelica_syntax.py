@@ -2,37 +2,13 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import NoReturn
 
-from shaftwork.core.errors import ModelFileError
+from shaftwork.modelica.reading.modelica_tokens import Cursor, fault, tokens_of_text
 
-_TOKENS = re.compile(
-    r"""(?P<space>\s+|//[^\n]*|/\*.*?\*/)
-    |(?P<text>"(?:[^"\\]|\\.)*")
-    |(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)
-    |(?P<name>[A-Za-z_]\w*|'(?:[^'\\\n]|\\.)+')
-    |(?P<sign>:=|<=|>=|==|<>|\.\+|\.-|\.\*|\./|\.\^|[-+*/^()\[\]{},;:=<>.])""",
-    re.VERBOSE | re.DOTALL | re.ASCII,
-)
-DEEPEST = 40
-"""Brackets in brackets that are read; no model has as many."""
-LONGEST = 2_000_000
-"""Characters of a file that are read."""
 CLASSES = ("model", "block", "package", "class", "connector", "record", "function", "type", "operator")
 _BEFORE_CLASSES = ("encapsulated", "partial", "final", "redeclare", "replaceable", "inner", "outer", "pure", "impure")
 _PREFIXES = ("parameter", "constant", "final", "inner", "outer", "input", "output", "flow", "discrete", "replaceable")
-
-
-@dataclass(frozen=True)
-class Token:
-    """A word, number, text or sign, and its line."""
-
-    kind: str
-    text: str
-    line: int
 
 
 @dataclass(frozen=True)
@@ -102,99 +78,17 @@ class ClassText:
     t_end: Term | None = None
 
 
-def fault(line: int, what: str) -> NoReturn:
-    """Raise the error of a line."""
-    raise ModelFileError(f"line {line}: {what}")
-
-
 def parse(text: str) -> tuple[str, tuple[ClassText, ...]]:
     """The name behind `within`, and the classes of a file.
 
     Raises:
         ModelFileError: the text is no Modelica; says where.
     """
-    if len(text) > LONGEST:
-        raise ModelFileError(f"it has more than {LONGEST} characters. Give the file of one model.")
-    return _Parser(tuple(_tokens(text))).file()
+    return _Parser(tuple(tokens_of_text(text))).file()
 
 
-def _tokens(text: str) -> Iterator[Token]:
-    place, line = 0, 1
-    text = text.removeprefix("\ufeff")
-    while place < len(text):
-        match = _TOKENS.match(text, place)
-        if match is None:
-            fault(line, f"{text[place]!r} begins nothing that Modelica has.")
-        kind = str(match.lastgroup)
-        if kind != "space":
-            yield Token(kind, match.group(), line)
-        line += match.group().count("\n")
-        place = match.end()
-    yield Token("end", "the end of the file", line)
-
-
-class _Parser:
-    """Reads tokens from the first to the last."""
-
-    def __init__(self, tokens: Sequence[Token]) -> None:
-        self._tokens, self._place, self._depth = tokens, 0, 0
-
-    # tokens
-
-    @property
-    def _next(self) -> Token:
-        return self._tokens[self._place]
-
-    def _take(self) -> Token:
-        token = self._next
-        self._place += token.kind != "end"
-        return token
-
-    def _at(self, *words: str) -> bool:
-        return self._next.text in words and self._next.kind in ("name", "sign")
-
-    def _accept(self, *words: str) -> Token | None:
-        return self._take() if self._at(*words) else None
-
-    def _expect(self, word: str) -> Token:
-        if not self._at(word):
-            fault(self._next.line, f"'{word}' is expected, and there is {self._shown}.")
-        return self._take()
-
-    @property
-    def _shown(self) -> str:
-        return self._next.text if self._next.kind == "end" else f"'{self._next.text[:30]}'"
-
-    def _name(self) -> Token:
-        if self._next.kind != "name":
-            fault(self._next.line, f"a name is expected, and there is {self._shown}.")
-        return self._take()
-
-    def _dotted(self) -> str:
-        self._accept(".")
-        names = [self._name().text]
-        while self._at(".") and self._tokens[self._place + 1].kind == "name":
-            self._take()
-            names.append(self._take().text)
-        return ".".join(names)
-
-    def _comment(self) -> None:
-        """Skip a text, texts that are added to it, and an annotation."""
-        while self._next.kind == "text":
-            self._take()
-            self._accept("+")
-        if self._accept("annotation"):
-            self._skip_brackets()
-
-    def _skip_brackets(self) -> None:
-        line, depth = self._next.line, 0
-        while True:
-            token = self._take()
-            if token.kind == "end":
-                fault(line, "a bracket is never closed.")
-            depth += {"(": 1, ")": -1}.get(token.text, 0) if token.kind == "sign" else 0
-            if not depth:
-                return
+class _Parser(Cursor):
+    """Goes through the tokens by the grammar."""
 
     # classes
 
@@ -220,7 +114,7 @@ class _Parser:
         while self._accept(*_BEFORE_CLASSES):
             pass
         if not self._at(*CLASSES):
-            fault(self._next.line, f"a model is expected, and there is {self._shown}.")
+            raise fault(self._next.line, f"a model is expected, and there is {self._shown}.")
         kind = self._take().text
         name = self._name()
         result = ClassText(kind, name.text, name.line)
@@ -232,18 +126,11 @@ class _Parser:
         self._deeper(lambda: self._body(result))
         return result
 
-    def _deeper(self, read: object) -> None:
-        self._depth += 1
-        if self._depth > DEEPEST:
-            fault(self._next.line, f"more than {DEEPEST} classes or brackets are in each other.")
-        read()  # type: ignore[operator]
-        self._depth -= 1
-
     def _body(self, result: ClassText) -> None:
         equations = False
         while not self._accept("end"):
             if self._next.kind == "end":
-                fault(result.line, f"'{result.name}' has no end.")
+                raise fault(result.line, f"'{result.name}' has no end.")
             if self._accept("public", "protected"):
                 equations = False
             elif self._accept("equation"):
@@ -258,7 +145,7 @@ class _Parser:
                 self._element(result)
         end = self._name()
         if end.text != result.name:
-            fault(end.line, f"'end {result.name}' is expected, and there is 'end {end.text}'.")
+            raise fault(end.line, f"'end {result.name}' is expected, and there is 'end {end.text}'.")
 
     def _annotation(self, result: ClassText) -> None:
         first = self._place
@@ -296,7 +183,7 @@ class _Parser:
         line = self._next.line
         while self._take().text != sign:
             if self._next.kind == "end":
-                fault(line, f"'{sign}' is expected behind this.")
+                raise fault(line, f"'{sign}' is expected behind this.")
 
     def _skip_to_semicolon(self) -> None:
         self._skip_to(";")
@@ -307,15 +194,15 @@ class _Parser:
         while True:
             token = self._take()
             if token.kind == "end":
-                fault(token.line, "an equation has no end.")
-            if token.kind == "name" and token.text in ("for", "when", "while"):
-                depth += 1
-            elif token.text == "if" and self._tokens[self._place - 2].text in (";", "equation", "then", "else", "loop"):
+                raise fault(token.line, "an equation has no end.")
+            if (token.kind == "name" and token.text in ("for", "when", "while")) or (
+                token.text == "if" and self._tokens[self._place - 2].text in (";", "equation", "then", "else", "loop")
+            ):
                 depth += 1
             elif token.text == "end" and self._at("for", "if", "when", "while"):
                 self._take()
                 depth -= 1
-            if token.text == ";" and depth <= 0 or self._at(";") and depth <= 0 and self._accept(";"):
+            if (token.text == ";" and depth <= 0) or (self._at(";") and depth <= 0 and self._accept(";")):
                 return
 
     def _element(self, result: ClassText) -> None:

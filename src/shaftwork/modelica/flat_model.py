@@ -15,8 +15,8 @@ from shaftwork.core.errors import CompileError
 from shaftwork.formulation.explicit_rows import BlockTooLargeError, Rows, explicit_rows
 from shaftwork.formulation.form import Names, StateForm
 from shaftwork.formulation.observables import Observables
-from shaftwork.modelica.expressions import INTERPOLATE, Identifiers, Printer, number, quoted, symbols_of, unit
-from shaftwork.modelica.writer import experiment
+from shaftwork.modelica.component_writer import experiment
+from shaftwork.modelica.modelica_expressions import INTERPOLATE, Identifiers, Printer, number, quoted, symbols_of, unit
 from shaftwork.network.graph import CircuitGraph, GraphPart, resolve
 from shaftwork.network.netlist import Netlist
 
@@ -62,14 +62,14 @@ def flat_text(form: StateForm, start: Mapping[str, float], t_end: float, turned:
         CompileError: a shaft is a travelling wave, too many unknowns are coupled, or a law has no counterpart.
     """
     graph = form.graph
+    if form.waves:
+        raise CompileError(f"'{graph.name}' in one set of equations: a shaft is a travelling wave. {_COMPONENT_FORM}")
     try:
-        if form.waves:
-            raise BlockTooLargeError
         rows = explicit_rows(form)
     except BlockTooLargeError:
         raise CompileError(
-            f"'{graph.name}' has no explicit equations in symbols: a shaft is a wave, laws determine each other, or "
-            f"too many unknowns are coupled. {_COMPONENT_FORM}"
+            f"'{graph.name}' has no explicit equations in symbols: laws determine each other, or too many unknowns are "
+            f"coupled. {_COMPONENT_FORM}"
         ) from None
     lines = list(_Flat(form, rows, start, turned).lines(t_end))
     name = Identifiers()[graph.name]

@@ -16,8 +16,8 @@ from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.core.files import in_a_folder, replaced
 from shaftwork.core.parameters import in_si
 from shaftwork.formulation.form import StateForm
-from shaftwork.modelica.flat import flat_text, in_one_mode
-from shaftwork.modelica.writer import component_text
+from shaftwork.modelica.component_writer import component_text
+from shaftwork.modelica.flat_model import flat_text, in_one_mode
 from shaftwork.network.netlist import Netlist
 
 Form = Literal["component", "flat"]

@@ -9,8 +9,8 @@ from typing import Any
 from shaftwork.core.domains import ROTATION, Domain
 from shaftwork.core.errors import CompileError
 from shaftwork.formulation.form import StateForm
-from shaftwork.modelica.expressions import INTERPOLATE, Identifiers, number, quoted
 from shaftwork.modelica.mode_models import part_model
+from shaftwork.modelica.modelica_expressions import INTERPOLATE, Identifiers, number, quoted
 from shaftwork.modelica.part_models import PartModel
 from shaftwork.modelica.standard_classes import FRAMES, StandardClass, standard_class
 from shaftwork.network.graph import GROUND, GraphPart, resolve
@@ -31,7 +31,7 @@ def component_text(form: StateForm, *, inline: bool, t_end: float, start: Mappin
     Raises:
         CompileError: a part, a law or a start value has no counterpart; names all such parts.
     """
-    work = _Writer(form, inline, start)
+    work = _Writer(form, start, inline=inline)
     lines, joints = work.instances(), work.connections()
     work.refuse()
     package = Identifiers()[form.graph.name]
@@ -62,7 +62,7 @@ def experiment(t_end: float) -> str:
 class _Writer:
     """Goes through the parts and collects instances, terminals at nodes, models and what cannot be written."""
 
-    def __init__(self, form: StateForm, inline: bool, start: Mapping[str, float]) -> None:
+    def __init__(self, form: StateForm, start: Mapping[str, float], *, inline: bool) -> None:
         self._form, self._graph, self._inline, self._start = form, form.graph, inline, start
         self._begun: list[str] = []
         self._names = Identifiers()
@@ -164,5 +164,3 @@ def _value(of: Any, values: Mapping[str, Any]) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     return value if isinstance(value, str) else number(value)
-
-
