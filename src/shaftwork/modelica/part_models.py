@@ -211,7 +211,10 @@ class PartModel:
         word = branch.template.label.rpartition("_")[0]
         histories = (other for other in self.branches if other.template.is_history and other is not branch)
         far = next(other for other in histories if other.template.label.rpartition("_")[0] == word)
-        impedance, delay = (self.printed(law, self.symbols) for law in branch.template.line or ())
+        impedance, travel = (self.printed(law, self.symbols) for law in branch.template.line or ())
+        delay = self.names[f"travel_{word}"]
+        declared = f'parameter Real {delay}(unit = "s") = {travel} "travel time of a wave";'
+        self.variables += [] if declared in self.variables else [declared]
         wave = f"2 * {impedance} * {difference(self.ends_of(far))} + {throughs[far.index].text()}"
         return f"-delay({wave}, {delay})"
 

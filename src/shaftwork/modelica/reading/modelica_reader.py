@@ -5,14 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-from shaftwork.components.base import Component
 from shaftwork.components.mechanics import Ground
 from shaftwork.core.errors import ModelFileError, ShaftworkError
+from shaftwork.modelica.modelica_expressions import Identifiers
 from shaftwork.modelica.reading.modelica_syntax import ClassText, Declaration, Modifier, parse
+from shaftwork.modelica.reading.modelica_terminals import Terminals
 from shaftwork.modelica.reading.modelica_tokens import LONGEST, fault
 from shaftwork.modelica.reading.modelica_values import Values
 from shaftwork.modelica.reading.read_classes import (
@@ -23,7 +23,10 @@ from shaftwork.modelica.reading.read_classes import (
     SPRINGS_BELOW,
     ReadClass,
     UnreadError,
+    can_be_supported,
+    supported,
 )
+from shaftwork.network.netlist import REFERENCE, Netlist, Origin, Placed
 from shaftwork.pipeline.network import Network
 from shaftwork.results.solution import Solution
 
@@ -84,7 +87,7 @@ def read_modelica(source: str | Path, model: str | None = None) -> ModelicaModel
     try:
         within, classes = parse(text)
         chosen, outer = _chosen(classes, model)
-        return _Reading(chosen, within, outer).result()
+        return _Reading(name, chosen, within, outer).result()
     except ModelFileError as error:
         raise ModelFileError(f"{name}: {error}") from None
 
@@ -127,28 +130,6 @@ def _names_of(one: ClassText, outer: tuple[ClassText, ...]) -> tuple[str, str]:
     return one.name, ".".join(part.name for part in (*outer, one))
 
 
-class _Nodes:
-    """Terminals that are joined."""
-
-    def __init__(self) -> None:
-        self._parents: dict[str, str] = {}
-
-    def of(self, terminal: str) -> str:
-        """The terminal that stands for all that it is joined with."""
-        root = terminal
-        while self._parents.get(root, root) != root:
-            root = self._parents[root]
-        while self._parents.get(terminal, terminal) != root:
-            self._parents[terminal], terminal = root, self._parents[terminal]
-        return root
-
-    def join(self, first: str, second: str) -> None:
-        """Make one of two."""
-        one, other = self.of(first), self.of(second)
-        if one != other:
-            self._parents[other] = one
-
-
 @dataclass
 class _Instance:
     """A part of the file."""
@@ -162,17 +143,21 @@ class _Instance:
 class _Reading:
     """Makes a network of a class."""
 
-    def __init__(self, text: ClassText, within: str, outer: tuple[ClassText, ...]) -> None:
-        self._text = text
+    def __init__(self, source: str, text: ClassText, within: str, outer: tuple[ClassText, ...]) -> None:
+        self._source, self._text = source, text
         self._imports = {k: v for one in (*outer, text) for k, v in one.imports.items()}
         names = [*filter(None, within.split(".")), *(one.name for one in outer)]
         self._around = [".".join(names[:k]) for k in range(len(names), 0, -1)]
         terms = {d.name: d.value for one in (*outer, text) for d in one.declarations if _is_parameter(d)}
         self._values = Values(terms)
-        self._nodes, self._places = _Nodes(), _Nodes()
+        self._nodes, self._places = Terminals(), Terminals()
         self._signals: dict[str, Any] = {}
         self._instances: dict[str, _Instance] = {}
+        names = [declaration.name for declaration in text.declarations]
+        other = Identifiers(names).unused("frame")
+        self._names = {**{name: name for name in names}, REFERENCE: other}  # which no part can be called
         self._inputs: dict[str, str] = {}
+        self._joined = set[str]()  # only asked for membership
 
     def result(self) -> ModelicaModel:
         """The network and what belongs to it."""
@@ -184,16 +169,17 @@ class _Reading:
             self._connect(first, second, line)
         if not self._instances:
             raise fault(self._text.line, f"'{self._text.name}' has no parts that are read.")
-        network = Network(self._text.name)
         frame = self._frame()
         placed = [item for name, instance in self._instances.items() for item in self._placed(name, instance, frame)]
-        taken = {node for part, nodes, _ in placed if not isinstance(part, Ground) for node in nodes}
-        for part, nodes, line in placed:
-            if not isinstance(part, Ground):
-                self._built(partial(network.add, part, *nodes), line, part.name)
-            elif nodes[0] in taken:  # one holds the node, and one where nothing else is holds nothing
-                network.add(part, *nodes)
-                taken.remove(nodes[0])
+        taken = {node for item in placed if not isinstance(item.part, Ground) for node in item.nodes}
+        parts: list[Placed] = []
+        for item in placed:
+            if not isinstance(item.part, Ground):
+                parts.append(item)
+            elif item.nodes[0] in taken:  # one holds the node, and one where nothing else is holds nothing
+                parts.append(item)
+                taken.remove(item.nodes[0])
+        network = Network._of(Netlist(self._text.name, tuple(parts)))  # noqa: SLF001 (as `Network.load` does)
         end = None if self._text.t_end is None else self._values.of(self._text.t_end)
         return ModelicaModel(network, self._initial(), end if isinstance(end, float) and end > 0 else None)
 
@@ -282,6 +268,7 @@ class _Reading:
         if one[0] == other[0] == "node":
             self._nodes.join(first, second)
             self._places.join(first, second)
+            self._joined |= {first, second}
             return
         pairs = {one[0]: first, other[0]: second}
         if pairs.keys() == {"output", "input"}:
@@ -314,18 +301,22 @@ class _Reading:
 
     # parts
 
-    def _placed(self, name: str, instance: _Instance, frame: frozenset[str]) -> list[tuple[Component, list[str], int]]:
-        """The parts of an instance with their nodes, and its line."""
+    def _placed(self, name: str, instance: _Instance, frame: frozenset[str]) -> list[Placed]:
+        """The parts of an instance at their nodes."""
         line, entry = instance.declaration.line, instance.entry
         if (signal := self._inputs.get(f"{name}.{entry.signal}")) is not None:
             instance.values[entry.signal] = self._signals[signal]
         if missing := [key for key, value in instance.values.items() if value is REQUIRED]:
             raise fault(line, f"'{name}' has no value of '{missing[0]}'. Give it in the file.")
-        support = self._nodes.of(f"{name}.support")
-        if entry.support and support != f"{name}.support" and support not in frame:
-            raise fault(line, f"the support of '{name}' is not at a Fixed, which alone is read.")
-        parts = self._built(lambda: list(entry.make(name, instance.values)), line, name)
-        return [(part, [self._node(f"{name}.{port}") for port in ports], line) for part, ports in parts]
+        parts = self._built(lambda: list(entry.make(self._names[name], instance.values)), line, name)
+        if f"{name}.support" in self._joined and self._nodes.of(f"{name}.support") not in frame:
+            if not all(map(can_be_supported, parts)):
+                raise fault(line, f"the support of '{name}' is not at a Fixed, which alone is read.")
+            parts = self._built(lambda: [supported(*placed) for placed in parts], line, name)
+        origin = Origin(self._source, {"": line})
+        return [
+            Placed(part, tuple(self._node(f"{name}.{port}") for port in ports), origin=origin) for part, ports in parts
+        ]
 
     def _node(self, terminal: str) -> str:
         """The name of the node at a terminal; a dot in it would be one inside a part."""

@@ -367,3 +367,27 @@ CLASSES: Mapping[str, ReadClass] = {
 }
 """Every class with physical ports that is read, by its full name."""
 BLOCKS = "Modelica.Blocks.Sources"
+
+
+def can_be_supported(placed: tuple[Component, tuple[str, ...]]) -> bool:
+    """Whether a part can stand on another node than the frame."""
+    part, ports = placed
+    return isinstance(part, Gear) or len(ports) < len(part.ports)
+
+
+def supported(part: Component, ports: tuple[str, ...]) -> tuple[Component, tuple[str, ...]]:
+    """A part on a support that moves.
+
+    A source or brake acts between its flange and the support. A gear is planetary, with
+    omega_a - omega_s = ratio (omega_b - omega_s): the fastest and the slowest of the three are its sun and ring.
+    """
+    if not isinstance(part, Gear):
+        return part, (*ports, "support")
+    (a, b), ratio = ports, float(part.ratio)
+    if ratio < 0:
+        return PlanetaryGear(part.name, ratio=-ratio), (a, "support", b)
+    if ratio == 1:
+        raise UnreadError("a gear of ratio 1 on a support that moves is a rigid joint. Join its flanges")
+    if ratio < 1:
+        return PlanetaryGear(part.name, ratio=1 / ratio - 1), (b, a, "support")
+    return PlanetaryGear(part.name, ratio=ratio - 1), (a, b, "support")
