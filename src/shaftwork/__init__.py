@@ -103,6 +103,10 @@ if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
     from shaftwork.core.parameters import parameter as parameter
     from shaftwork.equations.notations import Inverse as Inverse, Notation as Notation
     from shaftwork.opentorsion.reader import from_opentorsion as from_opentorsion
+    from shaftwork.modelica.reading.modelica_reader import (
+        ModelicaModel as ModelicaModel,
+        read_modelica as read_modelica,
+    )
     from shaftwork.pipeline.model import Model as Model
     from shaftwork.pipeline.network import Network as Network
     from shaftwork.reporting.report import Report as Report, report as report
@@ -161,6 +165,7 @@ _HOME = {
     "shaftwork.core.parameters": ("parameter",),
     "shaftwork.equations.notations": ("Inverse", "Notation"),
     "shaftwork.opentorsion.reader": ("from_opentorsion",),
+    "shaftwork.modelica.reading.modelica_reader": ("ModelicaModel", "read_modelica"),
     "shaftwork.pipeline.model": ("Model",),
     "shaftwork.pipeline.network": ("Network",),
     "shaftwork.reporting.report": ("Report", "report"),

@@ -25,6 +25,7 @@ USES = {
     "drawing": "net.draw()",
     "analogues": "net.circuit().simulate(0.1)",
     "control": "net.compile().linearize().to_scipy()",
+    "modelica": "net.to_modelica()",
     "studies": "sw.studies.work_precision",
     "spice": "net.to_spice()",
     "animation": "net.simulate(0.1).animate()",

@@ -1,0 +1,1 @@
+"""Networks as Modelica models, and Modelica models of plain drive trains as networks."""
