@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 
 from shaftwork.core.errors import Diagnostic, NetworkError, NetworkWarning
 from shaftwork.core.notices import warn
+from shaftwork.formulation.angles import with_angles
 from shaftwork.formulation.diagnosis import diagnose
 from shaftwork.formulation.form import StateForm
 from shaftwork.network.checks import SEPARATE, resting_trains
 from shaftwork.network.netlist import Netlist
-from shaftwork.pipeline.angles import with_angles
 from shaftwork.pipeline.model import Model
 
 
