@@ -26,6 +26,8 @@ VALUES: dict[str, dict[str, Any]] = {
     "Conveyor": {"m": 100.0, "radius": 0.2, "friction": 0.03, "incline": 0.3, "d": 2.0},
     "Brake": {"tau": 10.0, "on": sw.omega - 10},
     "Shaft": {"length": 1.0, "diameter": 0.1, "inner_diameter": 0.02, "damping": 3.0},
+    "StateSpaceController": {"measured": "J2.omega", "D": 1.0},
+    "TransferFunctionController": {"measured": "J2.omega", "numerator": 1.0, "denominator": 1.0},
     "SpeedController": {"omega_ref": 100 * sw.t, "k_p": 3.0, "t_i": 0.1, "tau_max": 40.0},
 }
 ONE_WAY = {"AveragedBLDC", "BLDCMotor", "Hoist", "InductionMachine"}
