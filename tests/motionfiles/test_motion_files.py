@@ -17,6 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import shaftwork as sw
+from shaftwork.motionfiles.record import record_text, solution_of
 from shaftwork.scenes import SCENES
 from tests.strategies import networks
 
@@ -37,11 +38,13 @@ def train(shaft: sw.Component | None = None) -> sw.Network:
 def motion(kind: str) -> sw.Solution:
     match kind:
         case "linear":
-            return train().simulate(0.2, t_eval=50, parameters={"shaft.c": 2e4}, initial={"J1.omega": 3.0})
+            return train().simulate(
+                0.2, t_eval=50, engine="scipy", parameters={"shaft.c": 2e4}, initial={"J1.omega": 3.0}
+            )
         case "steps":
             return train().simulate(0.2, t_eval="steps", engine="scipy", rtol=1e-6)
         case "angles":
-            return train().simulate(0.2, angles=["J2"], t_eval=20)
+            return train().simulate(0.2, angles=["J2"], t_eval=20, engine="scipy")
         case "hybrid":
             return sw.scenes.crane(gap=0.01).simulate(0.5, t_eval=60, engine="scipy")
         case "chain":
@@ -59,7 +62,7 @@ def same(first: Any, second: Any) -> bool:
     return bool(np.array_equal(first, second, equal_nan=True))
 
 
-@pytest.mark.parametrize("end", ENDS)
+@pytest.mark.parametrize("end", [".nc", ".parquet"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_motion_comes_back_to_the_last_bit(kind: str, end: str, tmp_path: Path) -> None:
     sol = motion(kind)
@@ -118,7 +121,7 @@ def test_names_with_slashes_and_other_signs_come_back(tmp_path: Path) -> None:
     net = sw.Network("a/b")
     net.add(sw.TorqueSource("m/1", tau=1.0), "n")
     net.add(sw.Inertia("räd at 3 m", J=2.0), "n")
-    sol = net.simulate(0.1, t_eval=5)
+    sol = net.simulate(0.1, t_eval=5, engine="scipy")
     for end in ENDS:
         sol.save(tmp_path / f"m{end}")
         again = sw.load_solution(tmp_path / f"m{end}")
@@ -133,10 +136,11 @@ def test_a_motion_that_went_on_with_waves_holds_what_was_saved_alone(tmp_path: P
     assert same(again["shaft.tau_a"], sol["shaft.tau_a"])
     with pytest.raises(sw.SignalError, match=r"holds the quantities that were saved alone: it went on .* waves"):
         again["shaft.tau_b"]
-    again.save(tmp_path / "again.nc", "J2.omega")
-    assert same(sw.load_solution(tmp_path / "again.nc").x, sol.x)
+    with pytest.raises(sw.SignalError, match="Save those that are wanted when the motion is made"):
+        again.save(tmp_path / "again.nc", "J2.omega")
 
 
+@pytest.mark.slow
 @given(networks(max_inertias=4), st.sampled_from(ENDS))
 def test_motions_of_random_networks_come_back(
     tmp_path_factory: pytest.TempPathFactory, pieces: tuple[Any, ...], end: str
@@ -145,7 +149,7 @@ def test_motions_of_random_networks_come_back(
     for piece in pieces:
         net.add(getattr(sw, piece.type)(piece.name, **piece.values), *piece.nodes)
     with suppress(sw.NetworkError):
-        sol = net.simulate(0.1, t_eval=7)
+        sol = net.simulate(0.1, t_eval=7, engine="scipy")
         path = tmp_path_factory.mktemp("motions") / f"motion{end}"
         sol.save(path)
         again = sw.load_solution(path)
@@ -224,15 +228,34 @@ def test_newer_files_and_other_files_are_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("end", [".nc", ".parquet"])
-def test_damaged_files_are_read_or_refused(end: str, tmp_path: Path) -> None:
-    chance, path = random.Random(5), tmp_path / f"m{end}"  # noqa: S311
+def test_damaged_files_are_read_or_refused(tmp_path: Path) -> None:
+    chance, path = random.Random(5), tmp_path / "m.parquet"  # noqa: S311
     motion("linear").save(path, "shaft.tau")
     whole = path.read_bytes()
-    for _ in range(200):
+    for _ in range(300):
         content = bytearray(whole)
         for _ in range(chance.randint(1, 20)):
             content[chance.randrange(len(content))] = chance.randrange(256)
         path.write_bytes(bytes(content[: chance.choice((len(content), chance.randrange(len(content))))]))
         with suppress(sw.ModelFileError):
             sw.load_solution(path)
+
+
+@pytest.mark.slow
+def test_what_a_file_says_is_read_or_refused_however_it_is_changed() -> None:
+    sol, chance = motion("hybrid"), random.Random(6)  # noqa: S311
+    said = record_text(sol, sol.again)
+    columns = {name: sol[name] for name in sol.states}
+    for _ in range(700):
+        text = list(said)
+        for _ in range(chance.randint(1, 5)):
+            place = chance.randrange(len(text))
+            match chance.randrange(3):
+                case 0:
+                    text[place] = chance.choice('{}[]":,.0123456789-eEnul\\')
+                case 1:
+                    del text[place : place + chance.randint(1, 9)]
+                case _:
+                    text[place:place] = text[chance.randrange(len(text)) :][:9]
+        with suppress(sw.ModelFileError):
+            solution_of("".join(text), sol.t, columns, ())

@@ -10,7 +10,8 @@ import numpy as np
 
 from shaftwork.core.errors import ModelFileError, ParameterError, imported
 from shaftwork.core.files import drafted, in_a_folder
-from shaftwork.motionfiles.record import Call, record_text, solution_of
+from shaftwork.motionfiles.record import ARRIVING, record_text, solution_of
+from shaftwork.pipeline.motion_start import Repetition
 from shaftwork.results.data_frames import to_pandas, to_xarray
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
@@ -22,7 +23,7 @@ SLASH, INSTEAD = "/", "\N{DIVISION SLASH}"
 Columns = Mapping[str, Array]
 
 
-def write_motion(call: Call, motion: Solution, path: Any, names: Sequence[str]) -> None:
+def write_motion(call: Repetition, motion: Solution, path: Any, names: Sequence[str]) -> None:
     """Write a motion; see `Solution.save`."""
     place = in_a_folder(path)
     writer, _ = _format_of(place)
@@ -76,8 +77,16 @@ def _write_netcdf(motion: Solution, names: Sequence[str], text: str, path: Path)
         data[name].attrs["long_name"] = str(name)
     renamed = {name: str(name).replace(SLASH, INSTEAD) for name in data.variables if SLASH in str(name)}
     data = data.rename(renamed)
+    for name, values in _arriving(motion):
+        data[name] = ("t", values, {"long_name": name})
     data[RECORD] = ((), text, {"long_name": "what Shaftwork needs to make the motion again"})
     data.to_netcdf(path, engine="h5netcdf")
+
+
+def _arriving(motion: Solution) -> Iterator[tuple[str, Array]]:
+    """What stands behind the states of a motion with travelling waves."""
+    for number, values in enumerate(motion.x.T[len(motion.states) :]):
+        yield f"{ARRIVING}{number:06d}", values
 
 
 def _read_netcdf(path: Path) -> tuple[str, Array, Columns]:
@@ -94,6 +103,8 @@ def _write_parquet(motion: Solution, names: Sequence[str], text: str, path: Path
     table = to_pandas(motion, names)
     along = {name: len(motion.places[name]) for name in names if motion[name].ndim > 1}
     units = {name: motion.reader.unit(name) for name in names}
+    for name, values in _arriving(motion):
+        table[name] = values
     table.attrs = {"title": motion.name, "units": units, "along": along, RECORD: text}
     table.to_parquet(path, engine="pyarrow")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -21,6 +21,8 @@ from shaftwork.results.solution import Solution
 
 FORMAT = 1
 """Version of what is written here; a reader refuses newer ones."""
+ARRIVING = "shaftwork arriving "
+"""Before the numbers of columns with what arrives at the ends of travelling waves, which stands behind the states."""
 PLAIN = ("name", "states", "engine", "why", "statistics", "events", "parameters", "initial", "rtol", "caveat")
 """Fields of a solution that stand in a file as they are."""
 
@@ -37,23 +39,18 @@ class NotRepeatable:
     name: str
     why: str
 
-    def __call__(self) -> Solution:
+    def __call__(self) -> NoReturn:
         raise SignalError(
             f"The file of '{self.name}' holds the quantities that were saved alone: {self.why}. Save those that are "
-            "wanted by name, sol.save(path, 'shaft.tau')."
+            "wanted when the motion is made."
         )
 
-    def save(self, motion: Solution, path: Any, names: Sequence[str]) -> None:
-        """Write what is there, as `Solution.save`."""
-        from shaftwork.motionfiles.files import write_motion
-
-        write_motion(self, motion, path, names)
+    def save(self, _motion: Solution, _path: Any, _names: Sequence[str]) -> NoReturn:
+        """Nothing that the file does not hold can be written: copy the file."""
+        self()
 
 
-Call = Repetition | NotRepeatable
-
-
-def record_text(motion: Solution, call: Call) -> str:
+def record_text(motion: Solution, call: Repetition) -> str:
     """What a file says of a motion.
 
     Raises:
@@ -90,21 +87,20 @@ def solution_of(text: str, t: Array, columns: Mapping[str, Array], trust: Any) -
         state["states"] = tuple(said["states"])
         state["events"] = tuple(map(tuple, said["events"]))
         state["phases"] = tuple(PhaseRow(start, end, dict(modes)) for start, end, modes in said["phases"])
-        x = np.column_stack([columns[name] for name in said["states"]]) if said["states"] else np.zeros((len(t), 0))
+        stored = [columns[name] for name in (*said["states"], *(name for name in columns if name.startswith(ARRIVING)))]
+        x = np.column_stack(stored) if stored else np.zeros((len(t), 0))
         call = _call_of(said["call"], said["name"], t, trusted)
     except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
         if isinstance(error, ModelFileError):
             raise
         raise ModelFileError(f"it is no motion that was saved: {error!r}") from None
-    others = {name: values for name, values in columns.items() if name not in said["states"]}
+    others = {name: columns[name] for name in columns if name not in said["states"] and not name.startswith(ARRIVING)}
     motion = Solution.__new__(Solution)
     motion.__setstate__({**state, "t": t, "x": x, "again": call, "saved": others})
     return motion
 
 
-def _call(call: Call, t: Array) -> dict[str, Any]:
-    if isinstance(call, NotRepeatable):
-        return {"why": call.why}
+def _call(call: Repetition, t: Array) -> dict[str, Any]:
     initial = call.initial
     if isinstance(initial, Ending) and initial.waves is not None:
         return {"why": "it went on from a motion with waves on their way through shafts"}
@@ -133,7 +129,7 @@ def _call(call: Call, t: Array) -> dict[str, Any]:
     }
 
 
-def _call_of(said: Mapping[str, Any], name: str, t: Array, trusted: Sequence[str]) -> Call:
+def _call_of(said: Mapping[str, Any], name: str, t: Array, trusted: Sequence[str]) -> Repetition | NotRepeatable:
     if "why" in said:
         return NotRepeatable(name, said["why"])
     netlist = netlist_of(textfile.read(said["network"]), "its network", trusted)
