@@ -34,12 +34,14 @@ USES = {
     "torsional": "sw.torsional.Section",
     "live": "sw.live.Session(net, t_end=0.1)",
     "stepper": "net.compile().start().step(0.1)",
+    "motionfiles": "net.simulate(0.1).save(folder / 'motion.nc')",
     "opentorsion": "sw.from_opentorsion({'components': [{'name': 'A', 'elements': []}]})",
 }
 """By feature, something small that takes it."""
 
 NEEDS = {
     "control": ("frequency",),
+    "motionfiles": ("modelfiles",),
     "reporting": ("latex", "drawing", "modelfiles"),
     "live": ("reporting", "latex", "drawing", "modelfiles", "frequency", "animation"),
 }
@@ -48,7 +50,7 @@ NEEDS = {
 JOINS = {
     "animation": ("shaftwork.live",),
     "drawing": ("shaftwork.reporting", "shaftwork.live"),
-    "modelfiles": ("shaftwork.reporting", "shaftwork.live"),
+    "modelfiles": ("shaftwork.reporting", "shaftwork.live", "shaftwork.motionfiles"),
     "reporting": ("shaftwork.live",),
     "frequency": ("shaftwork.live", "shaftwork.torsional.forced_train"),
     "hybrid": (

@@ -60,6 +60,21 @@ def replaced(path: str | Path) -> Iterator[IO[str]]:
         draft.unlink(missing_ok=True)
 
 
+@contextlib.contextmanager
+def drafted(place: Path) -> Iterator[Path]:
+    """A path for a library to write to, of the same end; what is there takes the place of the file once it is written.
+
+    Raises:
+        OSError: it cannot be written; what was there is as it was.
+    """
+    draft = place.with_name(f".{place.stem[:50]}.{os.getpid()}.{threading.get_ident()}.part{place.suffix}")
+    try:
+        yield draft
+        draft.replace(place)
+    finally:
+        draft.unlink(missing_ok=True)
+
+
 def write_rows(path: str | Path, head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
     """Write a table as CSV.
 

@@ -7,8 +7,9 @@ its network and the options of its compilation, a motion from the call that led 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 from weakref import WeakValueDictionary
 
@@ -220,6 +221,12 @@ class Repetition:
                 max_steps=demand.max_steps,
             )
             return motion
+
+    def save(self, motion: Solution, path: str | Path, names: Sequence[str]) -> None:
+        """Write the motion to a file, with this call; see `Solution.save`."""
+        from shaftwork.motionfiles.files import write_motion
+
+        write_motion(self, motion, path, names)
 
     def __reduce__(self) -> tuple[Any, ...]:
         if self.model is not None:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import reprlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from shaftwork.results.extremes import Extreme, Extremes, warn_of_coarse_samples
 from shaftwork.results.fatigue import Damage, Rainflow, SNLine, damage_of, damages, load_cycles
 from shaftwork.results.observer import Array, DenseStates, Observer, PhaseRow, Reader, array_in_si, span_of
 from shaftwork.results.plotting import plot_signals
+from shaftwork.results.stored_motion import Repeatable, StoredMotion, read_only
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,12 +33,9 @@ if TYPE_CHECKING:
     from shaftwork.spectra.order_spectra import OrderSpectra
     from shaftwork.spectra.spectrum import Spectrum
 
-COMPILED = ("dense", "observer")
-"""What of a motion holds compiled code."""
-
 
 @dataclass(frozen=True, eq=False)
-class Solution:
+class Solution(StoredMotion):
     """A motion.
 
     Args:
@@ -58,6 +56,7 @@ class Solution:
         caveat: what makes the numbers worth less than the tolerance says, in a sentence; empty where nothing does.
         again: makes the motion again. One that is stored (pickled) has no compiled code: when more of it is read than
             is stored, the motion is made again.
+        saved: quantities at the output times besides the states, of a motion from a file.
     """
 
     name: str
@@ -75,57 +74,17 @@ class Solution:
     initial: Mapping[str, float] = field(default_factory=dict)
     rtol: float = 1e-8
     caveat: str = ""
-    again: Callable[[], Solution] | None = None
+    again: Repeatable | None = None
+    saved: Mapping[str, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         vars(self)["t"] = np.array(self.t)  # the times may be those that the user gave
         self._protect()
 
-    def _protect(self) -> None:
-        """Refuse writing into times and states: all that is read of the motion comes from them."""
-        vars(self).update(t=_read_only(self.t), x=_read_only(self.x))
-
-    def __getstate__(self) -> dict[str, Any]:
-        stored = (item.name for item in fields(self) if item.name not in COMPILED)
-        return {name: getattr(self, name) for name in stored}
-
-    def __setstate__(self, state: Mapping[str, Any]) -> None:
-        vars(self).update(state)
-        self._protect()
-
-    def __deepcopy__(self, _memo: Any) -> Solution:
-        return replace(self, x=self.x.copy())
-
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any:
-            again = vars(self).get("again") if name in COMPILED else None
-            if again is None:
-                raise AttributeError(f"A Solution has no '{name}'.")
-            motion = again()
-            self._warn_of_another(motion)
-            vars(self).update({part: getattr(motion, part) for part in COMPILED})
-            return vars(self)[name]
-
-    def _warn_of_another(self, motion: Solution) -> None:
-        """Say where a motion that was made again differs from what was stored of it."""
-        if not self.x.size:
-            return
-        inside = np.append(self.t[1:] != self.t[:-1], True)  # of two sides the later one
-        off = np.abs(motion.dense(self.t[inside]) - self.x[inside]).max(axis=0)
-        share = float((off / np.maximum(np.abs(self.x).max(axis=0), np.finfo(float).tiny)).max())
-        # Two runs of one motion at the usual tolerance differ by less of the largest value of a state.
-        if share > 1e-6:
-            warn(
-                f"The stored motion of '{self.name}' was made again to be read, by other versions or on another "
-                f"machine: its states differ by up to {share:.1e} of their largest value.",
-                AccuracyWarning,
-            )
-
     @cached_property
     def steps(self) -> Array:
         """(s,) ends of the integration steps."""
-        return _read_only(self.dense.steps)
+        return read_only(self.dense.steps)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -143,6 +102,8 @@ class Solution:
         """
         if isinstance(name, str) and name in self.states:  # without the compiled code, which one that is stored has not
             return self.x[:, self.states.index(name)].copy()
+        if isinstance(name, str) and name in self.saved:
+            return self.saved[name].copy()
         return self.reader.values(name, self.t, self.x)
 
     @property
@@ -174,7 +135,7 @@ class Solution:
             raise SignalError(
                 f"The run goes from t = {first:g} s to {last:g} s; asked for {times.min()} to {times.max()}."
             )
-        return replace(self, t=times, x=self.dense(times))
+        return replace(self, t=times, x=self.dense(times), saved={})
 
     @cached_property
     def reader(self) -> Reader:
@@ -391,10 +352,3 @@ class Solution:
             '  Read a quantity with sol["part.quantity"]; all are in sol.names.',
         ]
         return on_one_screen(title, lines, len(lines))
-
-
-def _read_only(values: Array) -> Array:
-    """The same numbers, not to be written into."""
-    view = values.view()
-    view.flags.writeable = False
-    return view
