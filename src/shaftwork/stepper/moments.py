@@ -31,6 +31,8 @@ from shaftwork.results.observer import Reader
 if TYPE_CHECKING:
     from shaftwork.pipeline.model import Model
 
+SMOOTH = ("auto", "heyoka")
+"""Engines with which a step in which nothing happens is a series or two."""
 BESIDE = 1e-9
 """Seconds after an instant at which a quantity is read that has no value in it, as 0/0."""
 
@@ -272,7 +274,7 @@ def smooth_steps(model: CompiledModel, problem: Problem, demand: Demand, place: 
         place: to which the motion comes back, or None.
     """
     form = model.form
-    if demand.engine not in ("auto", "heyoka") or not available("heyoka"):
+    if demand.engine not in SMOOTH or not available("heyoka"):
         return None
     if form.waves or form.loop_laws or form.doubtful:
         return None

@@ -11,10 +11,11 @@ import numpy as np
 from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError
 from shaftwork.core.parameters import in_si
 from shaftwork.integrate.choice import check
+from shaftwork.integrate.engines import available
 from shaftwork.pipeline.arguments import Demand, Given, Names, relative_tolerance
 from shaftwork.pipeline.motion_start import ending_of, handed_over, time_of_start
 from shaftwork.results.solution import Solution
-from shaftwork.stepper.moments import Moment, MomentState, Observations, plain_moment
+from shaftwork.stepper.moments import SMOOTH, Moment, MomentState, Observations, plain_moment
 from shaftwork.stepper.settings import Settings
 
 if TYPE_CHECKING:
@@ -88,6 +89,7 @@ class Simulation:
         if parameters is not None and not isinstance(parameters, Mapping):
             raise ParameterError(f"parameters = {parameters!r} must map names to values, such as {{'shaft.c': 3e4}}.")
         self._options = Demand((0.0, 1.0), relative_tolerance(rtol), atol, None, engine, MOST_STEPS, None)
+        self._is_smooth = engine in SMOOTH and available("heyoka")
         self._settings = Settings(model, parameters, inputs)
         self._cached: dict[Any, Observations] = {}
         started: Any = ending_of(initial, model.form.graph) if isinstance(initial, Solution) else initial
@@ -129,10 +131,10 @@ class Simulation:
             SignalError: there is no such quantity; the message lists what the part has.
             SimulationError: it has no finite value here.
         """
-        if self._motion is not None and self._moment is None and self._settings.model.form.waves:
-            value = self._motion[name][-1]  # what is on its way is known of a motion alone
-            return value if np.ndim(value) else float(value)
-        return self._now[name]
+        if self._motion is None or self._moment is not None:
+            return self._now[name]
+        value = self._motion[name][-1]
+        return value if np.ndim(value) else float(value)
 
     def set(self, name: str, value: float) -> None:
         """Set an input of a source, "motor.tau", or any parameter, from now on: it holds until it is set again.
@@ -238,11 +240,11 @@ class Simulation:
         """Forget what was prepared for this instant, and keep what goes on from it."""
         if moment is not None and self._moved:
             self._origin = moment.ending()
-        self._moment, self._moved = None, False
+        self._moment, self._motion, self._moved = None, None, False
 
     def _goes_smoothly(self, end: float) -> bool:
         """Whether nothing happens up to a time in s, and the motion has come there."""
-        if self._settings.model.form.waves:
+        if not self._is_smooth or self._settings.model.form.waves:
             return False
         return self._now.advance(end)
 
@@ -260,4 +262,7 @@ class Simulation:
             motion = model.run_once(values, self._origin, self._demand(span))
         if self._options.engine == "auto" and not model.phased and not model.form.waves and model.states:
             self._engine = motion.engine  # to choose anew takes longer than many a step
-        self._origin, self._motion = handed_over(motion, {**model.parameters, **values}), motion
+        self._origin = ending = handed_over(motion, {**model.parameters, **values})
+        # what is on its way is known of a motion alone; else it is read where no moment is made anyway
+        if model.form.waves or not (self._is_smooth or ending.read != end):
+            self._motion = motion

@@ -13,13 +13,13 @@ import numpy as np
 from shaftwork.integrate.problem import Array, Problem
 from shaftwork.integrate.smooth_intervals import pieces
 from shaftwork.integrate.taylor.heyoka_run import TaylorRun
-from shaftwork.integrate.taylor.heyoka_switches import SOMEWHERE, keeps_sides
+from shaftwork.integrate.taylor.heyoka_switches import INSIDE, SOMEWHERE, WRONG_SIDE
 from shaftwork.integrate.taylor.heyoka_taylor import tolerance
 
 MOST = 100
 """Series in one step from outside: where more are needed the motion is stiff, and another engine may be quicker."""
-INSIDE = 0.9
-"""Where in a series it is compared with the equations, as a part of its length."""
+LOOKS = np.array([0.9, *INSIDE])
+"""Where in a series it is compared with the equations, and then where conditions are, as parts of its length."""
 DEFECT = 1e-8
 """Part of a state by which they may differ there, as in `TaylorRun`."""
 
@@ -127,15 +127,26 @@ class SmoothSteps:
             integrator.reset_cooldowns()
 
     def _is_first_good(self, integrator: Any, start: float) -> bool:
-        """Whether the first series satisfies the equations; heyoka may take it for a polynomial that it is not."""
-        elapsed = INSIDE * (integrator.time - start)
-        powers = elapsed**self._orders
-        state, change = np.array((powers, self._orders * powers)) @ integrator.tc.T
-        slopes = self._program.slopes(start + elapsed, state, integrator.pars)
-        defect = np.abs(elapsed * slopes - change)
+        """Whether the first series satisfies the equations, and no condition has changed on its way unseen.
+
+        heyoka may take it for a polynomial that it is not; see `TaylorRun` and `keeps_sides`.
+        """
+        program, parameters = self._program, integrator.pars
+        elapsed = LOOKS * (integrator.time - start)
+        powers = elapsed ** self._orders[:, None]
+        terms = integrator.tc
+        states = terms @ powers
+        state = np.ascontiguousarray(states[:, 0])
+        change = terms @ (self._orders * powers[:, 0])
+        defect = np.abs(elapsed[0] * program.slopes(start + elapsed[0], state, parameters) - change)
         if not (defect <= DEFECT * (np.abs(state) + np.abs(change)) + self._atol).all():
             return False
-        return bool(self._program.all_timed or keeps_sides(self._program, integrator, self.at.parameters, start))
+        if program.all_timed:
+            return True
+        repeated = np.repeat(self.at.parameters[:, None], elapsed.size, axis=1)
+        values = program.switch_values(start + elapsed, states, repeated)
+        signs = self.at.parameters[program.signs][:, None]
+        return bool((signs * values >= -WRONG_SIDE * np.abs(values).max(axis=1)[:, None]).all())
 
     def _is_clear(self, at: Snapshot) -> bool:
         """Whether all guards are within their limits and all conditions on the sides that their signs say."""
