@@ -29,8 +29,8 @@ from shaftwork.components.electrical import (
 )
 from shaftwork.components.laws import smaller, u
 from shaftwork.network.netlist import REFERENCE, Placed, first_few
-from shaftwork.spice.netlist_lines import ENDS, Line
-from shaftwork.spice.spice_numbers import Values
+from shaftwork.spice.netlist_lines import ENDS, NetlistLine
+from shaftwork.spice.spice_numbers import NetlistValues
 from shaftwork.spice.waveforms import source_law
 
 THERMAL = 1.380649e-23 * 300.15 / 1.602176634e-19
@@ -39,7 +39,7 @@ LARGEST_EXPONENT = 80.0
 """Up to here a diode is exponential: 1e-14 A times e^80 is beyond any current."""
 DEAD_WITHOUT_CAPACITY = ("vj", "m", "fc", "eg", "xti", "tnom", "level")
 """Parameters of diodes that change nothing at 27 degrees Celsius where there is no capacity."""
-Model = tuple[Line, str, Mapping[str, str]]
+DeviceModel = tuple[NetlistLine, str, Mapping[str, str]]
 """Of a .model its line, its type and its parameters."""
 
 
@@ -56,24 +56,24 @@ class Devices:
         ideal_diodes: whether diodes are ideal.
     """
 
-    values: Values
-    models: Mapping[str, Model]
+    values: NetlistValues
+    models: Mapping[str, DeviceModel]
     span: tuple[float, float]
     followed: Mapping[str, int]
     ideal_diodes: bool = False
     placed: list[Placed] = field(default_factory=list)
     initial: dict[str, float] = field(default_factory=dict)
-    inductors: dict[str, tuple[Line, float, tuple[str, str]]] = field(default_factory=dict)
+    inductors: dict[str, tuple[NetlistLine, float, tuple[str, str]]] = field(default_factory=dict)
     meters: dict[str, list[tuple[str, str]]] = field(default_factory=dict)
 
-    def add(self, line: Line) -> None:
+    def add(self, line: NetlistLine) -> None:
         """Add what a line is.
 
         Raises:
             LineError: it is not understood.
         """
         kind = line.command[0]
-        makers: dict[str, Callable[[Line, str], None]] = {
+        makers: dict[str, Callable[[NetlistLine, str], None]] = {
             "r": self._resistor,
             "c": self._capacitor,
             "l": self._inductor,
@@ -98,10 +98,10 @@ class Devices:
         """Add a part between nodes of the netlist."""
         self.placed.append(Placed(part, tuple(REFERENCE if node == "0" else node for node in nodes)))
 
-    def _ends(self, line: Line, count: int = 2) -> tuple[str, ...]:
+    def _ends(self, line: NetlistLine, count: int = 2) -> tuple[str, ...]:
         return tuple(map(line.node, line.words[1 : count + 1]))
 
-    def _value(self, line: Line, name: str, start: float | None = None) -> tuple[float, dict[str, str]]:
+    def _value(self, line: NetlistLine, name: str, start: float | None = None) -> tuple[float, dict[str, str]]:
         """The value of a resistor, capacitor or inductor, and its other parameters."""
         words = line.words
         if words[4:5] == ("=",):  # R = 1k
@@ -114,20 +114,20 @@ class Devices:
             raise line.error(f"{wrong}: it takes {name.upper()}{' and IC' if start is not None else ''} alone")
         return self.values.number(line, value), pairs
 
-    def _resistor(self, line: Line, name: str) -> None:
+    def _resistor(self, line: NetlistLine, name: str) -> None:
         resistance, _ = self._value(line, "r")
         if resistance >= 0:
             self.place(Resistor(name, R=resistance), *self._ends(line))
         else:  # it delivers power
             self.place(CurrentSource(name, i=-u / resistance), *self._ends(line))
 
-    def _capacitor(self, line: Line, name: str) -> None:
+    def _capacitor(self, line: NetlistLine, name: str) -> None:
         capacitance, pairs = self._value(line, "c", 0.0)
         self.place(Capacitor(name, C=capacitance), *self._ends(line))
         if "ic" in pairs:
             self.initial[f"{name}.u"] = self.values.number(line, pairs["ic"])
 
-    def _inductor(self, line: Line, name: str) -> None:
+    def _inductor(self, line: NetlistLine, name: str) -> None:
         inductance, pairs = self._value(line, "l", 0.0)
         p, n = self._ends(line)
         self.inductors[name.lower()] = line, inductance, (p, n)
@@ -135,10 +135,10 @@ class Devices:
             self.initial[f"{name}.i"] = self.values.number(line, pairs["ic"])
         self.place(Inductor(name, L=inductance), p, n)
 
-    def _voltage(self, line: Line, name: str) -> None:
+    def _voltage(self, line: NetlistLine, name: str) -> None:
         self._metered(line, name, source_law(line, self.values, self.span))
 
-    def _metered(self, line: Line, name: str, law: Any) -> None:
+    def _metered(self, line: NetlistLine, name: str, law: Any) -> None:
         """A voltage source with a place in series for each that follows its current."""
         p, n = self._ends(line)
         count = self.followed.get(name.lower(), 0)
@@ -150,11 +150,11 @@ class Devices:
             self.place(VoltageSource(name, u=law), inner[-1] if inner else p, n)
         self.meters[name.lower()] = meters
 
-    def _current(self, line: Line, name: str) -> None:
+    def _current(self, line: NetlistLine, name: str) -> None:
         p, n = self._ends(line)  # SPICE counts the current through the source, ours is delivered
         self.place(CurrentSource(name, i=source_law(line, self.values, self.span)), n, p)
 
-    def _controlled(self, line: Line, name: str) -> None:
+    def _controlled(self, line: NetlistLine, name: str) -> None:
         if len(line.words) != 6 or line.words[3].lower().startswith(("poly", "value", "vol", "cur", "table")):
             raise line.error("it has four nodes and a gain; other forms, as POLY and VALUE, are not read")
         gain = self.values.number(line, line.words[5])
@@ -163,7 +163,7 @@ class Devices:
             part if line.command[0] == "e" else VoltageControlledCurrentSource(name, g=gain), *self._ends(line, 4)
         )
 
-    def _following(self, line: Line, name: str) -> None:
+    def _following(self, line: NetlistLine, name: str) -> None:
         if len(line.words) != 5:
             raise line.error("it has two nodes, the name of a voltage source and a gain; other forms are not read")
         gain, source = self.values.number(line, line.words[4]), f"{line.prefix}{line.words[3]}".lower()
@@ -175,7 +175,7 @@ class Devices:
             part = CurrentControlledCurrentSource(name, gain=gain)
         self.place(part, *self._ends(line), *meter)
 
-    def _line(self, line: Line, name: str) -> None:
+    def _line(self, line: NetlistLine, name: str) -> None:
         pairs = line.pairs(5)
         if pairs.keys() - {"z0", "zo", "td", "f", "nl"}:
             raise line.error("a line has Z0 and TD, or F and NL; nothing else is read")
@@ -191,13 +191,13 @@ class Devices:
             raise line.error("it has no TD and no F, so that its delay is not known")
         self.place(TransmissionLine(name, Z_0=impedance, delay=delay), near, far)
 
-    def _above_zero(self, line: Line, text: str) -> float:
+    def _above_zero(self, line: NetlistLine, text: str) -> float:
         value = self.values.number(line, text)
         if not value > 0:
             raise line.error(f"'{text}' must be above zero")
         return value
 
-    def _model(self, line: Line, name: str, kind: str, known: Mapping[str, float]) -> dict[str, float]:
+    def _model(self, line: NetlistLine, name: str, kind: str, known: Mapping[str, float]) -> dict[str, float]:
         """The parameters of a model; those that are not known must be zero."""
         scoped = next((one for one in line.in_scope(name) if one in self.models), None)
         if scoped is None:
@@ -212,7 +212,7 @@ class Devices:
             raise origin.error(f"{', '.join(strange)} of a model of type {kind} is not read. Known: {', '.join(known)}")
         return {**known, **{key: read[key] for key in known if key in read}}
 
-    def _diode(self, line: Line, name: str) -> None:
+    def _diode(self, line: NetlistLine, name: str) -> None:
         p, n = self._ends(line)
         if self.ideal_diodes:
             self.place(Diode(name), p, n)
@@ -226,7 +226,7 @@ class Devices:
         current = model["is"] * (exp(smaller(u / (model["n"] * THERMAL), LARGEST_EXPONENT)) - 1)
         self.place(CurrentSource(name, i=-current), p, n)
 
-    def _switch(self, line: Line, name: str) -> None:
+    def _switch(self, line: NetlistLine, name: str) -> None:
         flags = [word.lower() for word in line.words[6:]]
         if flags not in ([], ["off"]):
             raise line.error(f"'{' '.join(flags)}' is not read: a switch begins as its voltage has it, or open")
@@ -235,7 +235,7 @@ class Devices:
         part = VoltageControlledSwitch(name, R_on=closed, R_off=opened, u_t=threshold, u_h=hysteresis)
         self.place(part, *self._ends(line, 4))
 
-    def couple(self, line: Line) -> None:
+    def couple(self, line: NetlistLine) -> None:
         """Put the equivalent circuit of two inductors that are coupled in their place.
 
         Law: u_1 = L_1 i_1' + M i_2', u_2 = M i_1' + L_2 i_2' with M = k sqrt(L_1 L_2): a leakage (1 - k^2) L_1 in

@@ -13,7 +13,7 @@ from shaftwork.components.controlled import VoltageControlledCurrentSource, Volt
 from shaftwork.components.electrical import CurrentSource, Resistor, Switch, Transformer
 from shaftwork.components.laws import t
 from shaftwork.spice.devices import Devices
-from shaftwork.spice.netlist_lines import Line
+from shaftwork.spice.netlist_lines import NetlistLine
 
 LONG_NAMES: tuple[str, ...] = (
     "TF",
@@ -45,7 +45,7 @@ def kind_of(name: str) -> str:
     return next((kind for kind in LONG_NAMES if name.startswith(kind)), name[0])
 
 
-def with_joined_nodes(lines: tuple[Line, ...]) -> tuple[Line, ...]:
+def with_joined_nodes(lines: tuple[NetlistLine, ...]) -> tuple[NetlistLine, ...]:
     """The lines without wires, whose ends are one node; node 0 gives them its name.
 
     Raises:
@@ -58,7 +58,7 @@ def with_joined_nodes(lines: tuple[Line, ...]) -> tuple[Line, ...]:
             node = parents[node]
         return node
 
-    others: list[Line] = []
+    others: list[NetlistLine] = []
     for line in lines:
         if kind_of(line.words[0]) in DRAWN:
             continue
@@ -78,13 +78,13 @@ def with_joined_nodes(lines: tuple[Line, ...]) -> tuple[Line, ...]:
 class LcapyDevices(Devices):
     """Makes parts of lcapy's lines: sources deliver at their first node, values have names, nodes have case."""
 
-    def add(self, line: Line) -> None:
+    def add(self, line: NetlistLine) -> None:
         """Add what a line is.
 
         Raises:
             LineError: it is not understood.
         """
-        makers: dict[str, Callable[[Line, str], None]] = {
+        makers: dict[str, Callable[[NetlistLine, str], None]] = {
             "R": self._resistor,
             "NR": self._resistor,
             "C": self._store,
@@ -111,23 +111,23 @@ class LcapyDevices(Devices):
             raise line.error("it has a name and two nodes; some of that is missing")
         makers[kind](line, line.words[0])
 
-    def _ends(self, line: Line, count: int = 2) -> tuple[str, ...]:
+    def _ends(self, line: NetlistLine, count: int = 2) -> tuple[str, ...]:
         return tuple(line.nodes[word] for word in line.words[1 : count + 1])
 
-    def _resistor(self, line: Line, name: str) -> None:
+    def _resistor(self, line: NetlistLine, name: str) -> None:
         self.place(Resistor(name, R=self._named(line, 3)), *self._ends(line))
 
-    def _named(self, line: Line, place: int) -> float:
+    def _named(self, line: NetlistLine, place: int) -> float:
         """A value, which has the name of the element where it is not given."""
         return self.values.number(line, line.words[place] if len(line.words) > place else line.words[0])
 
-    def _store(self, line: Line, name: str) -> None:
+    def _store(self, line: NetlistLine, name: str) -> None:
         words = (*line.words[:3], line.words[3] if len(line.words) > 3 else name)
         start = ("IC", "=", line.words[4]) if len(line.words) > 4 else ()
         changed = replace(line, words=(*words, *start))
         (self._capacitor if kind_of(name) == "C" else self._inductor)(changed, name)
 
-    def _law(self, line: Line) -> Any:
+    def _law(self, line: NetlistLine) -> Any:
         words = [word for word in line.words[3:] if word not in "(),"]
         match words:
             case []:
@@ -143,13 +143,13 @@ class LcapyDevices(Devices):
                 return self.values.law(line, value)
         raise line.error("the source is not understood. Known are: a value, {an expression of t}, dc, step, ac")
 
-    def _voltage(self, line: Line, name: str) -> None:
+    def _voltage(self, line: NetlistLine, name: str) -> None:
         self._metered(line, name, self._law(line))
 
-    def _current(self, line: Line, name: str) -> None:
+    def _current(self, line: NetlistLine, name: str) -> None:
         self.place(CurrentSource(name, i=self._law(line)), *self._ends(line))
 
-    def _controlled(self, line: Line, name: str) -> None:
+    def _controlled(self, line: NetlistLine, name: str) -> None:
         kind, words = kind_of(name), [word for word in line.words if word != "opamp"]
         p, n, cp, cn = (line.nodes.get(word, word) for word in (*words[1:5], *"????")[:4])
         if len(words) < 5 or line.words[3] in ("fdopamp", "inamp", "amp", "noisyopamp"):
@@ -165,7 +165,7 @@ class LcapyDevices(Devices):
         else:
             self.place(VoltageControlledCurrentSource(name, g=-gain), p, n, cp, cn)
 
-    def _transformer(self, line: Line, name: str) -> None:
+    def _transformer(self, line: NetlistLine, name: str) -> None:
         words = [word for word in line.words if word not in ("core", "scs")]
         if not 5 <= len(words) <= 7:
             raise line.error("of transformers those with two windings are read")
@@ -174,7 +174,7 @@ class LcapyDevices(Devices):
             raise line.error("a winding has no turns")
         self.place(Transformer(name, ratio=turns[0] / (turns[1] if len(turns) > 1 else 1.0)), *self._ends(line, 4))
 
-    def _timed_switch(self, line: Line, name: str) -> None:
+    def _timed_switch(self, line: NetlistLine, name: str) -> None:
         kind = next((word for word in line.words[3:] if word in ("no", "nc", "push", "spdt")), "no")
         times = [word for word in line.words[3:] if word != kind]
         if kind not in ("no", "nc") or len(times) > 1:

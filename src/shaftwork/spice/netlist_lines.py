@@ -39,13 +39,13 @@ ANALYSES += ("fft", "hb", "lin", "step")
 class LineError(ModelFileError):
     """What cannot be read in a line."""
 
-    def __init__(self, line: Line, why: str) -> None:
+    def __init__(self, line: NetlistLine, why: str) -> None:
         text = line.text if len(line.text) <= 80 else f"{line.text[:77]}..."
         super().__init__(f"line {line.number} '{text}': {why}")
 
 
 @dataclass(frozen=True)
-class Line:
+class NetlistLine:
     """A line with those that continue it.
 
     Args:
@@ -103,13 +103,13 @@ class Line:
 class Subcircuit:
     """The definition of a subcircuit: its line, its nodes, its parameters by default and its lines."""
 
-    line: Line
+    line: NetlistLine
     nodes: tuple[str, ...]
     values: Mapping[str, str]
-    lines: tuple[Line, ...]
+    lines: tuple[NetlistLine, ...]
 
 
-def lines_of(text: str, *, lcapy: bool) -> tuple[Line, ...]:
+def lines_of(text: str, *, lcapy: bool) -> tuple[NetlistLine, ...]:
     """The lines of a text that mean something, in their order.
 
     Raises:
@@ -120,19 +120,19 @@ def lines_of(text: str, *, lcapy: bool) -> tuple[Line, ...]:
     return tuple(_plain_lines(text) if lcapy else _spice_lines(text))
 
 
-def _plain_lines(text: str) -> Iterator[Line]:
+def _plain_lines(text: str) -> Iterator[NetlistLine]:
     """Lines of lcapy: what stands behind a semicolon is drawing, what begins with # or % a comment."""
     for number, row in enumerate(text.splitlines(), 1):
         content, _, drawing = row.partition(";")
         hints = [hint.strip() for hint in drawing.split(",")]
         if content.strip() and content.strip()[0] not in "#%*" and "nosim" not in hints:
-            yield Line(number, content.strip(), tuple(_WORD.findall(content)))
+            yield NetlistLine(number, content.strip(), tuple(_WORD.findall(content)))
 
 
-def _spice_lines(text: str) -> Iterator[Line]:
+def _spice_lines(text: str) -> Iterator[NetlistLine]:
     rows = text.splitlines()
     if rows and _ELEMENT.match(rows[0].strip()):
-        raise Line(1, rows[0].strip(), ("",)).error(
+        raise NetlistLine(1, rows[0].strip(), ("",)).error(
             "the first line of SPICE is its title, not an element. Add one above"
         )
     joined: list[tuple[int, str]] = []
@@ -145,7 +145,7 @@ def _spice_lines(text: str) -> Iterator[Line]:
             joined.append((number, content))
     skipped = False
     for number, content in joined:
-        line = Line(number, content, tuple(_WORD.findall(content)) or (content,))
+        line = NetlistLine(number, content, tuple(_WORD.findall(content)) or (content,))
         if line.command == ".end":
             return
         if line.command in (".control", ".endc"):
@@ -154,7 +154,7 @@ def _spice_lines(text: str) -> Iterator[Line]:
             yield line
 
 
-def flattened(lines: tuple[Line, ...]) -> tuple[Line, ...]:
+def flattened(lines: tuple[NetlistLine, ...]) -> tuple[NetlistLine, ...]:
     """The lines with those of subcircuits in place of their instances.
 
     Raises:
@@ -162,7 +162,7 @@ def flattened(lines: tuple[Line, ...]) -> tuple[Line, ...]:
     """
     everywhere = {word.lower(): word.lower() for line in lines if line.command == ".global" for word in line.words[1:]}
     outer, definitions = _definitions([line for line in lines if line.command != ".global"])
-    flat: list[Line] = []
+    flat: list[NetlistLine] = []
     for line in _expanded(outer, definitions, everywhere, 0):
         flat.append(line)
         if len(flat) > MOST_ELEMENTS:
@@ -170,11 +170,11 @@ def flattened(lines: tuple[Line, ...]) -> tuple[Line, ...]:
     return tuple(flat)
 
 
-def _definitions(lines: list[Line]) -> tuple[list[Line], dict[str, Subcircuit]]:
-    outer: list[Line] = []
+def _definitions(lines: list[NetlistLine]) -> tuple[list[NetlistLine], dict[str, Subcircuit]]:
+    outer: list[NetlistLine] = []
     definitions: dict[str, Subcircuit] = {}
-    inside: list[Line] = []
-    opening: Line | None = None
+    inside: list[NetlistLine] = []
+    opening: NetlistLine | None = None
     for line in lines:
         if line.command == ".subckt":
             if opening is not None or len(line.words) < 2:
@@ -192,12 +192,12 @@ def _definitions(lines: list[Line]) -> tuple[list[Line], dict[str, Subcircuit]]:
     return outer, definitions
 
 
-def _subcircuit(line: Line, lines: tuple[Line, ...]) -> Subcircuit:
+def _subcircuit(line: NetlistLine, lines: tuple[NetlistLine, ...]) -> Subcircuit:
     names, start = _before_pairs(line, 2)
     return Subcircuit(line, tuple(map(str.lower, names)), line.pairs(start), lines)
 
 
-def _before_pairs(line: Line, start: int) -> tuple[tuple[str, ...], int]:
+def _before_pairs(line: NetlistLine, start: int) -> tuple[tuple[str, ...], int]:
     """The words of a line before those of the form key = value, and where these begin."""
     words = line.words
     first = next((k for k in range(start, len(words)) if words[k : k + 1] == ("=",)), len(words) + 1) - 1
@@ -206,8 +206,8 @@ def _before_pairs(line: Line, start: int) -> tuple[tuple[str, ...], int]:
 
 
 def _expanded(
-    lines: Sequence[Line], definitions: Mapping[str, Subcircuit], everywhere: Mapping[str, str], depth: int
-) -> Iterator[Line]:
+    lines: Sequence[NetlistLine], definitions: Mapping[str, Subcircuit], everywhere: Mapping[str, str], depth: int
+) -> Iterator[NetlistLine]:
     for line in lines:
         if line.command[0] != "x":
             yield line
@@ -226,5 +226,5 @@ def _expanded(
         values = (*line.values, {**definition.values, **line.pairs(start)})
         values += tuple(one.pairs(1) for one in definition.lines if one.command == ".param")  # each reads those before
         circuit = (one for one in definition.lines if one.command != ".param")
-        inner = [Line(one.number, one.text, one.words, prefix, outside, values) for one in circuit]
+        inner = [NetlistLine(one.number, one.text, one.words, prefix, outside, values) for one in circuit]
         yield from _expanded(inner, definitions, everywhere, depth + 1)

@@ -20,10 +20,10 @@ from shaftwork.core.parameters import in_si
 from shaftwork.network.netlist import REFERENCE, Placed, is_name
 from shaftwork.pipeline.network import Network
 from shaftwork.results.solution import Solution
-from shaftwork.spice.devices import Devices, Model
+from shaftwork.spice.devices import DeviceModel, Devices
 from shaftwork.spice.lcapy_devices import LcapyDevices, kind_of, with_joined_nodes
-from shaftwork.spice.netlist_lines import ANALYSES, Line, LineError, flattened, lines_of
-from shaftwork.spice.spice_numbers import Values
+from shaftwork.spice.netlist_lines import ANALYSES, LineError, NetlistLine, flattened, lines_of
+from shaftwork.spice.spice_numbers import NetlistValues
 
 Dialect = Literal["spice", "lcapy"]
 MOST_FAULTS = 8
@@ -112,7 +112,7 @@ def read(
         raise ParameterError(f"dialect = {dialect!r} must be 'spice', 'lcapy' or None.")
     given = {str(name): in_si(f"values['{name}']", value) for name, value in (values or {}).items()}
     try:
-        return _Reader(text, given, dialect or _dialect_of(text), ideal_diodes).circuit(Path(title).stem)
+        return _NetlistReader(text, given, dialect or _dialect_of(text), ideal_diodes).circuit(Path(title).stem)
     except ModelFileError as error:
         raise ModelFileError(f"{title}: {error}") from None
 
@@ -131,21 +131,21 @@ def _dialect_of(text: str) -> Dialect:
     return "lcapy" if drawn or any(row[:1] == "W" and len(row.split()) == 3 for row in rows[1:]) else "spice"
 
 
-class _Reader:
+class _NetlistReader:
     """Reads one netlist."""
 
     def __init__(self, text: str, given: Mapping[str, float], dialect: Dialect, ideal_diodes: bool) -> None:  # noqa: FBT001
         self._lcapy, self._ideal_diodes = dialect == "lcapy", ideal_diodes
         names = given if self._lcapy else {name.lower(): value for name, value in given.items()}
-        self._given, self._values = names, Values(names, lcapy=self._lcapy)
+        self._given, self._values = names, NetlistValues(names, lcapy=self._lcapy)
         self._title = "" if self._lcapy else (text.splitlines() or [""])[0].strip().lstrip("*").strip()
         lines = lines_of(text, lcapy=self._lcapy)
         self._lines = with_joined_nodes(lines) if self._lcapy else flattened(lines)
-        self._models: dict[str, Model] = {}
-        self._start_voltages: list[tuple[Line, str, str]] = []
+        self._models: dict[str, DeviceModel] = {}
+        self._start_voltages: list[tuple[NetlistLine, str, str]] = []
         self._faults: list[LineError] = []
         self._span: tuple[float, float] = (0.0, 0.0)
-        self._uic: Line | None = None
+        self._uic: NetlistLine | None = None
 
     def circuit(self, title: str) -> SpiceCircuit:
         """The circuit."""
@@ -176,16 +176,16 @@ class _Reader:
         t_steady = BEFORE if self._lcapy else 0.0
         return SpiceCircuit(network, initial, from_rest, self._span[1] or None, t_steady)
 
-    def _kind(self, line: Line) -> str:
+    def _kind(self, line: NetlistLine) -> str:
         return kind_of(line.words[0]) if self._lcapy else line.command[0].upper()
 
-    def _devices(self, elements: list[Line]) -> Devices:
+    def _devices(self, elements: list[NetlistLine]) -> Devices:
         followers = (line for line in elements if self._kind(line) in _FOLLOWERS and len(line.words) > 3)
         followed = Counter(f"{line.prefix}{line.words[3]}".lower() for line in followers)
         kind = LcapyDevices if self._lcapy else Devices
         return kind(self._values, self._models, self._span, followed, self._ideal_diodes)
 
-    def _attempt(self, line: Line, step: Any) -> None:
+    def _attempt(self, line: NetlistLine, step: Any) -> None:
         try:
             step(line)
         except LineError as error:
@@ -193,7 +193,7 @@ class _Reader:
         except ParameterError as error:  # of a part whose values are out of their bounds
             self._faults.append(line.error(str(error)))
 
-    def _command(self, line: Line) -> None:
+    def _command(self, line: NetlistLine) -> None:
         command = line.command[1:]
         if command in ANALYSES:
             return
@@ -212,12 +212,12 @@ class _Reader:
             case _:
                 raise line.error(f"the command .{command} is not read. Write what it brings into the netlist")
 
-    def _model(self, line: Line) -> None:
+    def _model(self, line: NetlistLine) -> None:
         if len(line.words) < 3:
             raise line.error("a model has a name and a type")
         self._models[f"{line.prefix}{line.words[1]}".lower()] = line, line.words[2].lower(), line.pairs(3)
 
-    def _starts(self, line: Line) -> None:
+    def _starts(self, line: NetlistLine) -> None:
         words = [word for word in line.words[1:] if word not in "(),"]
         if len(words) % 4 or any(
             group[0].lower() != "v" or group[2] != "=" for group in zip(*[iter(words)] * 4, strict=True)
@@ -226,7 +226,7 @@ class _Reader:
         for _, node, _, value in zip(*[iter(words)] * 4, strict=True):
             self._start_voltages.append((line, line.node(node), value))
 
-    def _analysis(self, line: Line) -> None:
+    def _analysis(self, line: NetlistLine) -> None:
         words = [word.lower() for word in line.words[1:]]
         if "uic" in words:
             self._uic = line

@@ -12,7 +12,7 @@ from sympy import Expr
 from shaftwork.components.laws import t
 from shaftwork.core.errors import ModelFileError
 from shaftwork.network.expressions import parse
-from shaftwork.spice.netlist_lines import Line
+from shaftwork.spice.netlist_lines import NetlistLine
 
 SCALES = {"t": 1e12, "g": 1e9, "meg": 1e6, "k": 1e3, "mil": 25.4e-6, "m": 1e-3, "u": 1e-6, "µ": 1e-6, "μ": 1e-6}
 SCALES |= {"n": 1e-9, "p": 1e-12, "f": 1e-15}
@@ -31,7 +31,7 @@ def number_in(text: str) -> float | None:
     return None if match is None else float(match[1]) * SCALES.get((match[2] or "").lower(), 1.0)
 
 
-class Values:
+class NetlistValues:
     """Reads numbers and laws, with the parameters that they name.
 
     Args:
@@ -41,10 +41,10 @@ class Values:
 
     def __init__(self, parameters: Mapping[str, float], *, lcapy: bool) -> None:
         self.parameters, self._lcapy = dict(parameters), lcapy
-        self.missing: dict[str, Line] = {}
+        self.missing: dict[str, NetlistLine] = {}
         """Names without a value, and where they stand."""
 
-    def number(self, line: Line, text: str) -> float:
+    def number(self, line: NetlistLine, text: str) -> float:
         """A number.
 
         Raises:
@@ -59,7 +59,7 @@ class Values:
             raise line.error(f"'{text}' is no finite number")
         return value
 
-    def law(self, line: Line, text: str) -> Expr:
+    def law(self, line: NetlistLine, text: str) -> Expr:
         """A number or an expression of time.
 
         Raises:
@@ -67,7 +67,7 @@ class Values:
         """
         return self._expression(line, text, tuple(reversed(line.values)))
 
-    def _expression(self, line: Line, text: str, scopes: tuple[Mapping[str, str], ...]) -> Expr:
+    def _expression(self, line: NetlistLine, text: str, scopes: tuple[Mapping[str, str], ...]) -> Expr:
         inner = text.strip().strip("{}'\"").strip()
         inner = inner if self._lcapy else _IN_TEXT.sub(_plain, inner.lower())
         inner = re.sub(r"\b([A-Za-z]+)\s*\(", lambda match: f"{FUNCTIONS.get(match[1], match[1])}(", inner)
@@ -84,7 +84,7 @@ class Values:
             raise line.error(f"'{text}' is not finite and real")
         return value
 
-    def _parameter(self, line: Line, name: str, scopes: tuple[Mapping[str, str], ...]) -> Expr:
+    def _parameter(self, line: NetlistLine, name: str, scopes: tuple[Mapping[str, str], ...]) -> Expr:
         for k, scope in enumerate(scopes):
             if name in scope:  # it is written in what is around the subcircuit
                 return self._expression(line, scope[name], scopes[k + 1 :])

@@ -11,8 +11,8 @@ from sympy import Expr, Piecewise
 
 from shaftwork.components.laws import t
 from shaftwork.components.tables import Table
-from shaftwork.spice.netlist_lines import Line
-from shaftwork.spice.spice_numbers import Values
+from shaftwork.spice.netlist_lines import NetlistLine
+from shaftwork.spice.spice_numbers import NetlistValues
 
 WAVEFORMS = ("sin", "pulse", "pwl", "exp")
 SMALL = ("ac", "distof1", "distof2")
@@ -23,7 +23,7 @@ MOST_PERIODS = 1000
 """Periods of a pulse that are written out as a table: a motion then stops at each corner and at nothing else."""
 
 
-def source_law(line: Line, values: Values, span: tuple[float, float]) -> Any:
+def source_law(line: NetlistLine, values: NetlistValues, span: tuple[float, float]) -> Any:
     """The law of a source, from the words behind its nodes.
 
     Args:
@@ -56,7 +56,7 @@ def source_law(line: Line, values: Values, span: tuple[float, float]) -> Any:
     return law
 
 
-def _waveform(line: Line, kind: str, numbers: list[float], span: tuple[float, float]) -> Expr:
+def _waveform(line: NetlistLine, kind: str, numbers: list[float], span: tuple[float, float]) -> Expr:
     most = {"sin": 6, "pulse": 7, "exp": 6}.get(kind, len(numbers))
     if len(numbers) > most or len(numbers) < 2:
         raise line.error(f"{kind.upper()} has {len(numbers)} values, and takes 2 to {most}")
@@ -75,7 +75,7 @@ def _positive(numbers: Sequence[float], place: int, default: float) -> float:
     return value if value > 0 else default
 
 
-def _sine(line: Line, numbers: list[float], _: float, end: float) -> Expr:
+def _sine(line: NetlistLine, numbers: list[float], _: float, end: float) -> Expr:
     offset, amplitude, delay, damping, degrees = (*numbers[:2], *(_or(numbers, place, 0.0) for place in (3, 4, 5)))
     frequency = _or(numbers, 2, 0.0) or (1 / end if end else 0.0)
     if not frequency:
@@ -86,7 +86,7 @@ def _sine(line: Line, numbers: list[float], _: float, end: float) -> Expr:
     return offset + (Piecewise((amplitude * sympy.sin(phase), t < delay), (wave, True)) if delay > 0 else wave)
 
 
-def _pulse(line: Line, numbers: list[float], step: float, end: float) -> Expr:
+def _pulse(line: NetlistLine, numbers: list[float], step: float, end: float) -> Expr:
     low, high, delay = *numbers[:2], _or(numbers, 2, 0.0)
     rise, fall = (_positive(numbers, place, step) for place in (3, 4))
     width = _positive(numbers, 5, end or rise)
@@ -104,7 +104,7 @@ def _pulse(line: Line, numbers: list[float], step: float, end: float) -> Expr:
     return _table(points)
 
 
-def _pwl(line: Line, numbers: list[float]) -> Expr:
+def _pwl(line: NetlistLine, numbers: list[float]) -> Expr:
     times, levels = numbers[::2], numbers[1::2]
     if len(times) != len(levels) or any(later < time for time, later in pairwise(times)):
         raise line.error("PWL takes pairs of a time and a value, and times that do not fall")
@@ -121,7 +121,7 @@ def _table(points: list[tuple[float, float]]) -> Expr:
     return Table(*zip(*moved, strict=True))(t)
 
 
-def _exponential(_: Line, numbers: list[float], step: float, __: float) -> Expr:
+def _exponential(_: NetlistLine, numbers: list[float], step: float, __: float) -> Expr:
     low, high, begin = *numbers[:2], _or(numbers, 2, 0.0)
     rise, back = _positive(numbers, 3, step), _or(numbers, 4, begin + step)
     fall = _positive(numbers, 5, step)
