@@ -1,14 +1,8 @@
 """What does a step of a stepped motion cost, and how far is it from real time?
 
-<<<<<<< HEAD
-Run `python -m benchmarks.stepper`. CPU: process time of one step, median over the motion, in which the input of a
-source is set anew, the step made and a speed read; the mean has the steps with events in it, and those for which
-instants ahead are looked up. "again" is a step by `simulate(initial=...)`, as one would write it without a stepper.
-=======
 Run `python -m benchmarks.stepper`. CPU: process time of one step, median over the motion. In it the input of a source
 is set anew, the step made and a speed read; the mean has the steps with events in it, and those for which instants
 ahead are looked up. "again" is a step by `simulate(initial=...)`, as one would write it without a stepper.
->>>>>>> h-stepper
 """
 
 from __future__ import annotations
