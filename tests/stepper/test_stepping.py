@@ -176,6 +176,38 @@ def test_parameters_are_set_as_a_motion_goes_on_with_others() -> None:
         assert run["J2.omega"] == pytest.approx(motion["J2.omega"][-1], rel=1e-9)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_what_is_set_by_chance_acts_as_in_runs_one_after_another(seed: int) -> None:
+    """Torques, dampings, masses and ratios change at once; looking, saving and restoring change nothing."""
+    net = NETWORKS["gap"](1.1)  # with 1.0 the gap closes at the end of a step, where `simulate` tells what was before
+    net.add(sw.Brake("brake", tau=3.0, t_on=0.7), "wheel")
+    net.add(sw.Gear("gear", ratio=2.0), "wheel", "slow")
+    net.add(sw.Spring("rope", c=90.0, d=0.5), "slow", "end")
+    net.add(sw.Inertia("J3", J=1.0), "end")
+    ranges = {
+        "motor.tau": (-15, 15),
+        "load.tau": (0.5, 4),
+        "J3.J": (0.5, 2),
+        "rope.d": (0.1, 1),
+        "gear.ratio": (1.5, 2.5),
+    }
+    chance, model = np.random.default_rng(seed), net.compile()
+    run, motion, values = model.start(inputs=["motor.tau"], rtol=RTOL), None, dict[str, float]()
+    for _ in range(30):
+        if chance.random() < 0.5:
+            name = str(chance.choice([*ranges]))
+            values[name] = float(chance.uniform(*ranges[name]))
+            run.set(name, values[name])
+        assert chance.random() < 0.7 or run["J2.omega"] is not None
+        if chance.random() < 0.2:
+            run.restore(run.save_state())
+        run.step(float(chance.choice([0.01, 0.05, 0.1])))
+        motion = model.simulate(run.t, initial=motion, parameters=values, rtol=RTOL, t_eval=2)
+        for one in ("J1.omega", "J3.omega", "shaft.tau", "rope.tau"):
+            assert run[one] == pytest.approx(motion[one][-1], abs=1e-7)
+
+
 @pytest.mark.parametrize("name", ["brake", "noise", "dependent inertia"])
 def test_every_quantity_is_that_of_the_motion(name: str) -> None:
     """Tolerance 1e-9 of the largest value of a quantity, or of 1."""
