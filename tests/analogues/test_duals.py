@@ -256,6 +256,8 @@ def test_a_dual_with_laws_is_the_same_after_it_was_saved(tmp_path: Path) -> None
 WITHOUT_DUAL = (
     *("LossyGear", "Backlash", "TranslationalBacklash", "SpeedController"),
     *("Switch", "InductionMachine", "BLDCMotor", "AveragedBLDC"),
+    *("VoltageControlledVoltageSource", "VoltageControlledCurrentSource", "VoltageControlledSwitch"),
+    *("CurrentControlledCurrentSource", "CurrentControlledVoltageSource", "TransmissionLine"),
 )
 """Parts of which the one in the test bed has no dual: flanks there are rigid."""
 
