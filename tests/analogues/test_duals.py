@@ -257,6 +257,8 @@ WITHOUT_DUAL = (
     *("LossyGear", "Backlash", "TranslationalBacklash", "SpeedController"),
     *("Switch", "InductionMachine", "BLDCMotor", "AveragedBLDC"),
     *("StateSpaceController", "TransferFunctionController"),
+    *("VoltageControlledVoltageSource", "VoltageControlledCurrentSource", "VoltageControlledSwitch"),
+    *("CurrentControlledCurrentSource", "CurrentControlledVoltageSource", "TransmissionLine"),
 )
 """Parts of which the one in the test bed has no dual: flanks there are rigid."""
 

@@ -252,6 +252,8 @@ def test_the_signals_of_a_component_multiply_to_its_power(name: str) -> None:
         found = sol["subject.omega_a"] * sol["subject.tau_a"] - sol["subject.omega_b"] * sol["subject.tau_b"]
     elif name == "Transformer":
         found = sol["subject.u_1"] * sol["subject.i_1"] + sol["subject.u_2"] * sol["subject.i_2"]
+    elif name == "TransmissionLine":
+        found = sol["subject.u_a"] * sol["subject.i_a"] + sol["subject.u_b"] * sol["subject.i_b"]
     elif kind.role == "coupling":
         found = np.zeros_like(wanted)
         for port in kind.ports:
