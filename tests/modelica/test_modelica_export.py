@@ -23,8 +23,6 @@ REFUSED = {
     "Backlash": "Give its flanks a stiffness c",
     "TranslationalBacklash": "Give its flanks a stiffness c",
     "BLDCMotor": "changes its mode in a way that is not written",
-    "RandomLoad": "HeldNoise, which has no counterpart",
-    "BucketWheelLoad": "HeldNoise, which has no counterpart",
 }
 WITHOUT_MASS = ("DryFriction", "Brake", "Clutch")
 """Their beds have no inertia at their nodes, where their acceleration would be anything."""
@@ -185,6 +183,16 @@ def test_a_gap_moves_alike_by_its_equations_and_shows_its_torque() -> None:
     assert deviation(net, {"gap.tau": "gap_tau"}, 2.0, text=text) < 1e-4
 
 
+@pytest.mark.parametrize("noise", [sw.HeldNoise(sw.t / 0.05, 1), sw.SmoothNoise(sw.t / 0.2, -2.5)])
+def test_noise_has_the_same_numbers(noise: sympy.Expr) -> None:
+    net = sw.Network("wind")
+    net.add(sw.TorqueSource("wind", tau=5 * noise), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    for form in ("component", "flat"):
+        text = net.to_modelica(form=form, library="inline")
+        assert deviation(net, stores(net, flat=form == "flat"), 2.0, text=text) < AGREES
+
+
 def test_a_travelling_wave_arrives_late() -> None:
     net = sw.Network("wave")
     net.add(sw.TorqueSource("motor", tau=10 * sympy.sin(20 * sw.t)), "a")
@@ -210,7 +218,7 @@ def test_start_values_are_those_of_a_simulation() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["crane-start", "crane", "six-phases", "shaft-step", "ship-engine"])
 def test_scenes_move_alike(name: str) -> None:
-    scene = next(scene for scene in sw.scenes.SCENES if scene.name == name)
+    scene = sw.scenes.SCENES[name]
     net = scene()
     text = net.to_modelica(library="inline", t_end=scene.t_end)
     assert deviation(net, stores(net, flat=False), scene.t_end, text=text) < AGREES
@@ -219,10 +227,11 @@ def test_scenes_move_alike(name: str) -> None:
 def test_what_has_no_such_form_is_refused_by_name() -> None:
     net = crane()
     net.add(sw.Brake("brake", tau=50.0, on=sw.omega - 3), "wheel")
-    net.add(sw.RandomLoad("wind", mean=5.0, std=1.0, interval=0.1, seed=1), "rotor")
-    with pytest.raises(sw.CompileError, match=r"Brake 'brake': a law `on` .* RandomLoad 'wind': a law has HeldNoise"):
+    net.add(sw.Backlash("gap", gap=0.1), "wheel", "hook")
+    net.add(sw.Inertia("J3", J=1.0), "hook")
+    with pytest.raises(sw.CompileError, match=r"Brake 'brake': a law `on` .* Backlash 'gap' .* stiffness c\."):
         net.to_modelica()
-    with pytest.raises(sw.CompileError, match=r"CoulombLoad 'load', Brake 'brake', RandomLoad 'wind' would change"):
+    with pytest.raises(sw.CompileError, match=r"CoulombLoad 'load', Brake 'brake', Backlash 'gap' would change"):
         net.to_modelica(form="flat")
 
 

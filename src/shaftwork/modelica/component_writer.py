@@ -10,7 +10,7 @@ from shaftwork.core.domains import ROTATION, Domain
 from shaftwork.core.errors import CompileError
 from shaftwork.formulation.form import StateForm
 from shaftwork.modelica.mode_models import part_model
-from shaftwork.modelica.modelica_expressions import INTERPOLATE, Identifiers, number, quoted
+from shaftwork.modelica.modelica_expressions import Identifiers, functions_in, number, quoted
 from shaftwork.modelica.part_models import PartModel
 from shaftwork.modelica.standard_classes import FRAMES, StandardClass, standard_class
 from shaftwork.network.graph import GROUND, GraphPart, resolve
@@ -49,7 +49,7 @@ def component_text(form: StateForm, *, inline: bool, t_end: float, start: Mappin
         ]
     )
     models = [*work.models.values()]
-    models += [INTERPOLATE] if any("interpolate(" in model for model in models) else []
+    models.append(functions_in("".join(models)))
     models += [files(__package__).joinpath(LIBRARY).read_text(encoding="utf-8")] if inline else []
     return "\n".join([text, *models, f"end {package};", ""])
 

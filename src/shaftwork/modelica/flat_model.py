@@ -16,7 +16,7 @@ from shaftwork.formulation.explicit_rows import BlockTooLargeError, Rows, explic
 from shaftwork.formulation.form import Names, StateForm
 from shaftwork.formulation.observables import Observables
 from shaftwork.modelica.component_writer import experiment
-from shaftwork.modelica.modelica_expressions import INTERPOLATE, Identifiers, Printer, number, quoted, symbols_of, unit
+from shaftwork.modelica.modelica_expressions import Identifiers, Printer, functions_in, number, quoted, symbols_of, unit
 from shaftwork.network.graph import CircuitGraph, GraphPart, resolve
 from shaftwork.network.netlist import Netlist
 
@@ -74,7 +74,7 @@ def flat_text(form: StateForm, start: Mapping[str, float], t_end: float, turned:
     lines = list(_Flat(form, rows, start, turned).lines(t_end))
     name = Identifiers()[graph.name]
     text = "\n".join([f"model {name} {quoted(graph.name)}", *lines, f"end {name};", ""])
-    return text.replace("\n", f"\n{INTERPOLATE}", 1) if "interpolate(" in text else text
+    return text.replace("\n", f"\n{functions_in(text)}", 1)
 
 
 class _Flat:
@@ -85,7 +85,8 @@ class _Flat:
         self._names = Identifiers()
         self._parameters = {name: self._names[name] for name in form.graph.parameters}
         self._states = {state.name: self._names[state.name] for state in form.states}
-        self._printer = Printer(symbols_of({**self._parameters, **self._states}), f"'{form.graph.name}'")
+        values = {Symbol(name, real=True): value for name, value in form.graph.parameters.items()}
+        self._printer = Printer(symbols_of({**self._parameters, **self._states}), f"'{form.graph.name}'", values)
 
     def lines(self, t_end: float) -> Iterator[str]:
         """Declarations, equations and the experiment."""

@@ -69,7 +69,7 @@ class _ModeModel(PartModel):
         names = {ACROSS: across, **self.symbols}
         if expression.has(INTEGRAL):
             names[INTEGRAL] = self.twist(plus, minus)
-        return Printer(names, self.title).doprint(expression)
+        return Printer(names, self.title, self.values).doprint(expression)
 
     @property
     def across(self) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from functools import reduce
+from textwrap import fill
 from types import MappingProxyType
 from typing import Any
 
@@ -14,6 +15,7 @@ from sympy.printing.codeprinter import CodePrinter
 
 from shaftwork.codegen.code import RealNumbers
 from shaftwork.components.laws import t as TIME
+from shaftwork.components.noise import normal
 from shaftwork.core.errors import CompileError
 
 KEYWORDS = frozenset(
@@ -45,6 +47,9 @@ INTERPOLATE = """  function interpolate "Straight lines between points, constant
   end interpolate;
 """
 """The function that tables are printed as."""
+NOISE = range(-16, 1001)
+"""The numbers of noise that a text holds; a motion that comes to others stops there."""
+_NOISE_NAME = re.compile(r"held_noise_(\w+)\(")
 _UNITS = {"ohm": "Ohm"}
 
 
@@ -54,6 +59,7 @@ class Printer(RealNumbers, CodePrinter):  # type: ignore[misc]
     Args:
         names: the text of each symbol; what else stands in an expression has none.
         title: whose law it is, for messages.
+        values: of parameters by their symbols, where noise reads its seed.
     """
 
     language = "Modelica"
@@ -61,9 +67,9 @@ class Printer(RealNumbers, CodePrinter):  # type: ignore[misc]
     settings: Mapping[str, Any] = MappingProxyType({"order": "none"})
     _operators = MappingProxyType({"and": "and", "or": "or", "not": "not"})
 
-    def __init__(self, names: Mapping[Any, str], title: str) -> None:
+    def __init__(self, names: Mapping[Any, str], title: str, values: Mapping[Any, float] | None = None) -> None:
         super().__init__({TIME: "time", **names})
-        self.title = title
+        self.title, self.values = title, values or {}
 
     def _print_Integer(self, whole: Integer) -> str:
         return str(whole) if abs(whole) < 2**31 else repr(float(whole))
@@ -141,6 +147,15 @@ class Printer(RealNumbers, CodePrinter):  # type: ignore[misc]
         points, values = (", ".join(map(number, numbers)) for numbers in (table.xs, table.ys))
         return f"interpolate({{{points}}}, {{{values}}}, {self._print(table.argument)})"
 
+    def _print_HeldNoise(self, noise: Expr) -> str:
+        number_of, seed = noise.args
+        seed = self.values.get(seed, seed)
+        word = repr(float(seed)).removesuffix(".0").replace("-", "m").replace(".", "p").replace("+", "")
+        return f"held_noise_{word}({self._print(number_of)})"
+
+    def _print_SmoothNoise(self, noise: Any) -> str:
+        return self._print(noise.pieces)
+
     def _print_Function(self, function: Expr) -> str:
         name = function.func.__name__
         if name not in FUNCTIONS:
@@ -158,6 +173,32 @@ FUNCTIONS = (
     *("exp", "log", "sign", "floor"),
 )
 """Functions that have the same name in sympy and in Modelica."""
+
+
+def functions_in(text: str) -> str:
+    """The functions that laws in a text call: interpolation in tables, and noise by its seeds."""
+    functions = [INTERPOLATE] if "interpolate(" in text else []
+    return "".join((*functions, *map(_noise, dict.fromkeys(_NOISE_NAME.findall(text)))))
+
+
+def _noise(word: str) -> str:
+    """The function of the noise of a seed."""
+    seed = float(word.replace("m", "-").replace("p", "."))
+    values = fill(
+        ", ".join(repr(normal(k, seed)) for k in NOISE), 110, initial_indent=" " * 6, subsequent_indent=" " * 6
+    )
+    reach = f"k >= {NOISE[0]} and k <= {NOISE[-1]}"
+    return f"""  function held_noise_{word} "Number k of the standard normal numbers of the seed {seed:g}"
+    input Real k;
+    output Real v;
+  protected
+    constant Real values[{len(NOISE)}] = {{
+{values}}};
+  algorithm
+    assert({reach}, "The text holds the noise of {reach} alone");
+    v := values[integer(k) + {1 - NOISE[0]}];
+  end held_noise_{word};
+"""
 
 
 def number(value: float) -> str:

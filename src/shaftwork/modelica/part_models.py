@@ -13,7 +13,7 @@ from shaftwork.formulation.form import StateForm
 from shaftwork.modelica.indexed_rows import FEW, Group, Place, difference, family, groups_of, runs_of, total
 from shaftwork.modelica.modelica_expressions import Identifiers, Printer, quoted, symbols_of, unit
 from shaftwork.modelica.standard_classes import CONNECTORS
-from shaftwork.network.graph import GROUND, GraphBranch, GraphPart, signals_of
+from shaftwork.network.graph import GROUND, GraphBranch, GraphPart, resolve, signals_of
 from shaftwork.network.kinds import Kind
 
 INTEGRALS = {ROTATION: "phi", TRANSLATION: "s", ELECTRICAL: "psi"}
@@ -41,6 +41,7 @@ class PartModel:
         self.ports = {port.name: self.names[port.name] for port in component.ports}
         self.parameters = {name: self.names.unused(name) for name in part.parameters}
         self.symbols = symbols_of(self.parameters)
+        self.values = {Symbol(name, real=True): value for name, value in resolve(component)[0].items()}
         self._signals = {name: self.names.unused(name) for name in signals_of(self.graph, part)}
         self.variables: list[str] = []
         self.equations: list[str] = []
@@ -193,7 +194,7 @@ class PartModel:
 
     def printed(self, law: Expr, names: Mapping[Symbol, str]) -> str:
         """A law as a factor."""
-        text = Printer(names, self.title).doprint(law)
+        text = Printer(names, self.title, self.values).doprint(law)
         return text if re.fullmatch(r"[\w.\[\]]+", text) else f"({text})"
 
     def _reading(self, symbol: Symbol, throughs: Mapping[int, Place]) -> str:
