@@ -1,30 +1,26 @@
-"""What a file says of a motion besides its numbers: what it is, and the call that led to it, as JSON."""
+"""Motions read from files."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
 
-from shaftwork.core.errors import ModelFileError, SignalError
+from shaftwork.core.errors import ModelFileError, ParameterError, SignalError
 from shaftwork.modelfiles import textfile
 from shaftwork.modelfiles.own_parts import checked_trust
-from shaftwork.modelfiles.storage import netlist_of, netlist_text
+from shaftwork.modelfiles.storage import netlist_of
+from shaftwork.motionfiles.motion_formats import ARRIVING, format_of
+from shaftwork.motionfiles.motion_writing import FORMAT, PLAIN
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.compiler import Compiler
 from shaftwork.pipeline.motion_start import Ending, Repetition
 from shaftwork.results.observer import Array, PhaseRow
 from shaftwork.results.solution import Solution
-
-FORMAT = 1
-"""Version of what is written here; a reader refuses newer ones."""
-ARRIVING = "shaftwork arriving "
-"""Before the numbers of columns with what arrives at the ends of travelling waves, which stands behind the states."""
-PLAIN = ("name", "states", "engine", "why", "statistics", "events", "parameters", "initial", "rtol", "caveat")
-"""Fields of a solution that stand in a file as they are."""
 
 
 @dataclass(frozen=True)
@@ -50,16 +46,38 @@ class NotRepeatable:
         self()
 
 
-def record_text(motion: Solution, call: Repetition) -> str:
-    """What a file says of a motion.
+def load_solution(path: str | Path, *, trust: Sequence[str] = ()) -> Solution:
+    """The motion in a file that `Solution.save` wrote: the same states and saved quantities, to the last bit.
+
+    Other quantities, `at`, extremes and the energy balance are read from the motion made again, when the first of them
+    is read: the file holds the network and the call. An `AccuracyWarning` says where it comes out otherwise.
+
+    Args:
+        path: of the file, .nc, .h5 or .parquet.
+        trust: packages whose modules may be imported for parts of one's own, as for `Network.load`.
 
     Raises:
-        ModelFileError: a part of the network has no text form.
+        MissingExtraError: a library is not installed (extra `files`).
+        ModelFileError: the file cannot be read, or holds no motion.
+        ParameterError: another end of the name, or `trust` has no names of packages.
     """
-    facts = {name: getattr(motion, name) for name in PLAIN}
-    phases = [[row.start, row.end, dict(row.modes)] for row in motion.phases]
-    said = {"format": FORMAT, **facts, "phases": phases, "call": _call(call, motion.t)}
-    return json.dumps(said, default=_as_plain, allow_nan=False)
+    try:
+        place = Path(path)
+    except TypeError:
+        raise ParameterError(f"path = {path!r} must be the name of a file, such as 'crane.nc'.") from None
+    _, reader = format_of(place)
+    if not place.is_file():
+        raise ModelFileError(f"There is no file '{place}'.")
+    try:
+        text, t, columns = reader(place)
+    except ImportError:
+        raise
+    except Exception as error:  # noqa: BLE001 (libraries of formats raise anything for a damaged file)
+        raise ModelFileError(f"{place} cannot be read: {error}. Give a file that Solution.save wrote.") from None
+    try:
+        return solution_of(text, t, columns, trust)
+    except ModelFileError as error:
+        raise ModelFileError(f"{place}: {error}") from None
 
 
 def solution_of(text: str, t: Array, columns: Mapping[str, Array], trust: Any) -> Solution:
@@ -72,7 +90,7 @@ def solution_of(text: str, t: Array, columns: Mapping[str, Array], trust: Any) -
         trust: packages whose parts may be imported.
 
     Raises:
-        ModelFileError: it is not what `record_text` writes.
+        ModelFileError: it is not what `write_motion` writes.
         ParameterError: `trust` has no names of packages.
     """
     trusted = checked_trust(trust)
@@ -100,35 +118,6 @@ def solution_of(text: str, t: Array, columns: Mapping[str, Array], trust: Any) -
     return motion
 
 
-def _call(call: Repetition, t: Array) -> dict[str, Any]:
-    initial = call.initial
-    if isinstance(initial, Ending) and initial.waves is not None:
-        return {"why": "it went on from a motion with waves on their way through shafts"}
-    if not isinstance(call.rebuild, Compiler):
-        return {"why": "its model was not made by Network.compile"}
-    demand = call.demand
-    times = "t" if demand.t_eval is not None and np.array_equal(demand.t_eval, t) else demand.t_eval
-    before = (
-        {"t": initial.t, "read": initial.read, "modes": initial.modes, "parameters": initial.parameters}
-        if isinstance(initial, Ending)
-        else None
-    )
-    return {
-        "network": netlist_text(call.netlist),
-        "angles": call.rebuild.angles,
-        "accepted": call.rebuild.accepted,
-        "span": demand.span,
-        "rtol": demand.rtol,
-        "atol": demand.atol,
-        "t_eval": times,
-        "max_steps": demand.max_steps,
-        "engine": call.engine,
-        "values": call.values,
-        "initial": initial,
-        "before": before,
-    }
-
-
 def _call_of(said: Mapping[str, Any], name: str, t: Array, trusted: Sequence[str]) -> Repetition | NotRepeatable:
     if "why" in said:
         return NotRepeatable(name, said["why"])
@@ -149,12 +138,3 @@ def _call_of(said: Mapping[str, Any], name: str, t: Array, trusted: Sequence[str
     )
     rebuild = Compiler(tuple(said["angles"]), said["accepted"])
     return Repetition(rebuild, netlist, demand, said["engine"], said["values"], initial)
-
-
-def _as_plain(value: Any) -> Any:
-    """A number or array of numpy, a tuple or a mapping, as JSON has it."""
-    if isinstance(value, Mapping):
-        return dict(value)
-    if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
-    raise TypeError(f"{type(value).__name__} has no place in JSON")

@@ -1,4 +1,4 @@
-"""Motions written to netCDF and Parquet, and read again."""
+"""Columns of a motion and a text, in netCDF and Parquet."""
 
 from __future__ import annotations
 
@@ -8,10 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from shaftwork.core.errors import ModelFileError, ParameterError, imported
-from shaftwork.core.files import drafted, in_a_folder
-from shaftwork.motionfiles.record import ARRIVING, record_text, solution_of
-from shaftwork.pipeline.motion_start import Repetition
+from shaftwork.core.errors import ParameterError, imported
 from shaftwork.results.data_frames import to_pandas, to_xarray
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
@@ -20,54 +17,9 @@ RECORD = "shaftwork"
 """What a file says of the motion: a variable of netCDF, as attributes have at most 64 kB; an attribute of Parquet."""
 SLASH, INSTEAD = "/", "\N{DIVISION SLASH}"
 """In names of netCDF a slash would begin a group."""
+ARRIVING = "shaftwork arriving "
+"""Before the numbers of columns with what arrives at the ends of travelling waves, which stands behind the states."""
 Columns = Mapping[str, Array]
-
-
-def write_motion(call: Repetition, motion: Solution, path: Any, names: Sequence[str]) -> None:
-    """Write a motion; see `Solution.save`."""
-    place = in_a_folder(path)
-    writer, _ = _format_of(place)
-    wanted = dict.fromkeys((*motion.states, *(names or (*motion.names, *motion.places))))
-    text = record_text(motion, call)
-    try:
-        with drafted(place) as draft:
-            writer(motion, tuple(wanted), text, draft)
-    except OSError as error:
-        raise ModelFileError(f"{place} cannot be written: {error}.") from None
-
-
-def load_solution(path: str | Path, *, trust: Sequence[str] = ()) -> Solution:
-    """The motion in a file that `Solution.save` wrote: the same states and saved quantities, to the last bit.
-
-    Other quantities, `at`, extremes and the energy balance are read from the motion made again, when the first of them
-    is read: the file holds the network and the call. An `AccuracyWarning` says where it comes out otherwise.
-
-    Args:
-        path: of the file, .nc, .h5 or .parquet.
-        trust: packages whose modules may be imported for parts of one's own, as for `Network.load`.
-
-    Raises:
-        MissingExtraError: a library is not installed (extra `files`).
-        ModelFileError: the file cannot be read, or holds no motion.
-        ParameterError: another end of the name, or `trust` has no names of packages.
-    """
-    try:
-        place = Path(path)
-    except TypeError:
-        raise ParameterError(f"path = {path!r} must be the name of a file, such as 'crane.nc'.") from None
-    _, reader = _format_of(place)
-    if not place.is_file():
-        raise ModelFileError(f"There is no file '{place}'.")
-    try:
-        text, t, columns = reader(place)
-    except ImportError:
-        raise
-    except Exception as error:  # noqa: BLE001 (libraries of formats raise anything for a damaged file)
-        raise ModelFileError(f"{place} cannot be read: {error}. Give a file that Solution.save wrote.") from None
-    try:
-        return solution_of(text, t, columns, trust)
-    except ModelFileError as error:
-        raise ModelFileError(f"{place}: {error}") from None
 
 
 def _write_netcdf(motion: Solution, names: Sequence[str], text: str, path: Path) -> None:
@@ -140,7 +92,12 @@ FORMATS: Mapping[str, tuple[Writer, Loader]] = {
 """By the end of a name, what writes and reads such files; netCDF 4 is HDF5."""
 
 
-def _format_of(place: Path) -> tuple[Writer, Loader]:
+def format_of(place: Path) -> tuple[Writer, Loader]:
+    """What writes and reads a file, by the end of its name.
+
+    Raises:
+        ParameterError: no end that is known.
+    """
     if place.suffix.lower() not in FORMATS:
         raise ParameterError(f"'{place.name}' has no end that is known. Take one of: {', '.join(FORMATS)}.")
     return FORMATS[place.suffix.lower()]
