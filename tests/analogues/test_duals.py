@@ -124,7 +124,7 @@ WHY_NOT = (
     (sw.Inertia("part", J=2.0 + 0.5 * sympy.sin(sw.phi)), "what it stores changes, and inductances are constant"),
     (
         sw.LossyGear("part", ratio=2.0, efficiency=0.9),
-        "it loses power in its teeth, by the direction in which that goes",
+        "it does not hand on all power that it takes: teeth lose some, and controlled sources add theirs",
     ),
     (
         sw.Shaft("part", length=3.0, diameter=0.05, model=sw.Wave()),

@@ -203,7 +203,7 @@ def _reason(part: GraphPart, graph: CircuitGraph) -> str:
     if any(template.reads for template in templates) and _of_current(part) is None:
         return "its laws read other nodes and branches, and those of a dual their own current alone"
     if any(template.through for template in templates):
-        return "it loses power in its teeth, by the direction in which that goes"
+        return "it does not hand on all power that it takes: teeth lose some, and controlled sources add theirs"
     return f"it {why}" if part.modes and (why := DualModes(part).problem) else ""
 
 
