@@ -99,7 +99,7 @@ if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
     )
     from shaftwork.core.parameters import parameter as parameter
     from shaftwork.equations.notations import Inverse as Inverse, Notation as Notation
-    from shaftwork.motionfiles.files import load_solution as load_solution
+    from shaftwork.motionfiles.loading import load_solution as load_solution
     from shaftwork.opentorsion.reader import from_opentorsion as from_opentorsion
     from shaftwork.pipeline.model import Model as Model
     from shaftwork.pipeline.network import Network as Network
@@ -158,7 +158,7 @@ _HOME = {
     ),
     "shaftwork.core.parameters": ("parameter",),
     "shaftwork.equations.notations": ("Inverse", "Notation"),
-    "shaftwork.motionfiles.files": ("load_solution",),
+    "shaftwork.motionfiles.loading": ("load_solution",),
     "shaftwork.opentorsion.reader": ("from_opentorsion",),
     "shaftwork.pipeline.model": ("Model",),
     "shaftwork.pipeline.network": ("Network",),

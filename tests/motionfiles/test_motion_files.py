@@ -17,7 +17,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import shaftwork as sw
-from shaftwork.motionfiles.record import record_text, solution_of
+from shaftwork.motionfiles.loading import solution_of
+from shaftwork.motionfiles.record import record_text
 from shaftwork.scenes import SCENES
 from tests.strategies import networks
 

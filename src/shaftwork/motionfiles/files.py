@@ -10,8 +10,7 @@ import numpy as np
 
 from shaftwork.core.errors import ModelFileError, ParameterError, imported
 from shaftwork.core.files import drafted, in_a_folder
-from shaftwork.motionfiles.record import ARRIVING, record_text, solution_of
-from shaftwork.pipeline.motion_start import Repetition
+from shaftwork.motionfiles.record import ARRIVING, Call, record_text
 from shaftwork.results.data_frames import to_pandas, to_xarray
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
@@ -23,7 +22,7 @@ SLASH, INSTEAD = "/", "\N{DIVISION SLASH}"
 Columns = Mapping[str, Array]
 
 
-def write_motion(call: Repetition, motion: Solution, path: Any, names: Sequence[str]) -> None:
+def write_motion(call: Call, motion: Solution, path: Any, names: Sequence[str]) -> None:
     """Write a motion; see `Solution.save`."""
     place = in_a_folder(path)
     writer, _ = _format_of(place)
@@ -36,38 +35,23 @@ def write_motion(call: Repetition, motion: Solution, path: Any, names: Sequence[
         raise ModelFileError(f"{place} cannot be written: {error}.") from None
 
 
-def load_solution(path: str | Path, *, trust: Sequence[str] = ()) -> Solution:
-    """The motion in a file that `Solution.save` wrote: the same states and saved quantities, to the last bit.
-
-    Other quantities, `at`, extremes and the energy balance are read from the motion made again, when the first of them
-    is read: the file holds the network and the call. An `AccuracyWarning` says where it comes out otherwise.
-
-    Args:
-        path: of the file, .nc, .h5 or .parquet.
-        trust: packages whose modules may be imported for parts of one's own, as for `Network.load`.
+def read_motion(place: Path) -> tuple[str, Array, Columns]:
+    """What a file says of a motion, its output times (k,) in s, and its quantities at these by name.
 
     Raises:
-        MissingExtraError: a library is not installed (extra `files`).
-        ModelFileError: the file cannot be read, or holds no motion.
-        ParameterError: another end of the name, or `trust` has no names of packages.
+        MissingExtraError: a library is not installed.
+        ModelFileError: there is no such file, or it cannot be read.
+        ParameterError: another end of the name.
     """
-    try:
-        place = Path(path)
-    except TypeError:
-        raise ParameterError(f"path = {path!r} must be the name of a file, such as 'crane.nc'.") from None
     _, reader = _format_of(place)
     if not place.is_file():
         raise ModelFileError(f"There is no file '{place}'.")
     try:
-        text, t, columns = reader(place)
+        return reader(place)
     except ImportError:
         raise
     except Exception as error:  # noqa: BLE001 (libraries of formats raise anything for a damaged file)
         raise ModelFileError(f"{place} cannot be read: {error}. Give a file that Solution.save wrote.") from None
-    try:
-        return solution_of(text, t, columns, trust)
-    except ModelFileError as error:
-        raise ModelFileError(f"{place}: {error}") from None
 
 
 def _write_netcdf(motion: Solution, names: Sequence[str], text: str, path: Path) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.opentorsion.train import Disc, Element, Mesh, ShaftElement, unique
+from shaftwork.opentorsion.train import Disc, Element, GearMesh, ShaftElement, unique
 
 LISTS = ("shaft_elements", "disk_elements", "gear_elements", "elastic_gear_elements")
 """What an assembly has; older ones have no elastic gears."""
@@ -53,7 +53,7 @@ def _elements(assembly: Any) -> Iterator[Element]:
         if gear.parent is not None:
             ratio = _number(gear, "R") / _number(gear.parent, "R")
             flexible = (_number(gear, "k"), _number(gear, "c")) if gear in elastic else ()
-            yield Mesh(name, _whole(gear.parent, "node"), node, ratio, *flexible)
+            yield GearMesh(name, _whole(gear.parent, "node"), node, ratio, *flexible)
 
 
 def _number(element: Any, name: str) -> float:

@@ -16,7 +16,7 @@ from typing import Any
 
 from shaftwork.core.errors import ModelFileError, NetworkWarning
 from shaftwork.core.notices import warn
-from shaftwork.opentorsion.train import Disc, Element, Mesh, ShaftElement, unique
+from shaftwork.opentorsion.train import Disc, Element, GearMesh, ShaftElement, unique
 
 DENSITY, SHEAR_MODULUS = 8000.0, 80e9
 """kg/m^3 and Pa, where a file does not say, as openTorsion has them."""
@@ -148,7 +148,7 @@ class _Reading:
                     child = node if parent is None else next(numbers)
                     yield Disc(title, child, _number(row, "inertia", place), _number(row, "damping", place, 0.0))
                     if parent is not None:
-                        yield Mesh(title, parent[0], child, _ratio(row, parent[1], place))
+                        yield GearMesh(title, parent[0], child, _ratio(row, parent[1], place))
                     gears[label], node = (child, row), child
                 case _:
                     raise ModelFileError(f"{place}: its type is {_short(kind)}. Types are: {', '.join(KINDS)}.")

@@ -69,7 +69,7 @@ class ShaftElement:
 
 
 @dataclass(frozen=True)
-class Mesh:
+class GearMesh:
     """A pair of gears that turn against each other, rigid or elastic.
 
     Law: omega_parent = -ratio omega_child; an elastic one has a spring between parent and what is there on the right.
@@ -98,7 +98,7 @@ class Mesh:
             yield Spring(f"{self.name} teeth", c=self.stiffness, d=self.damping), (_node(self.parent), mesh)
 
 
-Element = Disc | ShaftElement | Mesh
+Element = Disc | ShaftElement | GearMesh
 
 
 def network_of_elements(name: str, elements: Sequence[Element]) -> Network:
