@@ -17,8 +17,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import shaftwork as sw
-from shaftwork.motionfiles.motion_reading import solution_of
-from shaftwork.motionfiles.motion_writing import record_text
+from shaftwork.motionfiles.loading import solution_of
+from shaftwork.motionfiles.record import record_text
 from shaftwork.scenes import SCENES
 from tests.strategies import networks
 

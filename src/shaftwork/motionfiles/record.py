@@ -1,43 +1,61 @@
-"""Motions written to files, with the call that led to them."""
+"""What a file says of a motion besides its numbers: what it is, and the call that led to it, as JSON."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any, Protocol
 
 import numpy as np
 
-from shaftwork.core.errors import ModelFileError
-from shaftwork.core.files import drafted, in_a_folder
 from shaftwork.modelfiles.storage import netlist_text
-from shaftwork.motionfiles.motion_formats import format_of
+from shaftwork.network.netlist import Netlist
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
 
-if TYPE_CHECKING:
-    from shaftwork.pipeline.motion_start import Repetition
-
 FORMAT = 1
 """Version of what is written here; a reader refuses newer ones."""
+ARRIVING = "shaftwork arriving "
+"""Before the numbers of columns with what arrives at the ends of travelling waves, which stands behind the states."""
 PLAIN = ("name", "states", "engine", "why", "statistics", "events", "parameters", "initial", "rtol", "caveat")
 """Fields of a solution that stand in a file as they are."""
 
 
-def write_motion(call: Repetition, motion: Solution, path: Any, names: Sequence[str]) -> None:
-    """Write a motion; see `Solution.save`."""
-    place = in_a_folder(path)
-    writer, _ = format_of(place)
-    wanted = dict.fromkeys((*motion.states, *(names or (*motion.names, *motion.places))))
-    text = record_text(motion, call)
-    try:
-        with drafted(place) as draft:
-            writer(motion, tuple(wanted), text, draft)
-    except OSError as error:
-        raise ModelFileError(f"{place} cannot be written: {error}.") from None
+class Call(Protocol):
+    """The call that led to a motion, as `pipeline` has it, which knows this room by its door alone."""
+
+    @property
+    def rebuild(self) -> Any:
+        """Has the options of `Network.compile`: `angles` and `accepted`."""
+        ...
+
+    @property
+    def netlist(self) -> Netlist:
+        """The network."""
+        ...
+
+    @property
+    def demand(self) -> Any:
+        """What was asked."""
+        ...
+
+    @property
+    def engine(self) -> str:
+        """That was taken."""
+        ...
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """Parameters that differ."""
+        ...
+
+    @property
+    def initial(self) -> Any:
+        """Start values, or the end of a motion before, which has `waves`, `modes` and `parameters`."""
+        ...
 
 
-def record_text(motion: Solution, call: Repetition) -> str:
+def record_text(motion: Solution, call: Call) -> str:
     """What a file says of a motion.
 
     Raises:
@@ -49,25 +67,21 @@ def record_text(motion: Solution, call: Repetition) -> str:
     return json.dumps(said, default=_as_plain, allow_nan=False)
 
 
-def _call(call: Repetition, t: Array) -> dict[str, Any]:
-    initial: Any = call.initial
-    goes_on = hasattr(initial, "read")  # from where another motion has ended
-    if goes_on and initial.waves is not None:
+def _call(call: Call, t: Array) -> dict[str, Any]:
+    initial = call.initial
+    if getattr(initial, "waves", None) is not None:
         return {"why": "it went on from a motion with waves on their way through shafts"}
-    compiler: Any = call.rebuild
-    if not hasattr(compiler, "angles"):
-        return {"why": "its model was not made by Network.compile"}
     demand = call.demand
     times = "t" if demand.t_eval is not None and np.array_equal(demand.t_eval, t) else demand.t_eval
     before = (
         {"t": initial.t, "read": initial.read, "modes": initial.modes, "parameters": initial.parameters}
-        if goes_on
+        if hasattr(initial, "waves")
         else None
     )
     return {
         "network": netlist_text(call.netlist),
-        "angles": compiler.angles,
-        "accepted": compiler.accepted,
+        "angles": call.rebuild.angles,
+        "accepted": call.rebuild.accepted,
         "span": demand.span,
         "rtol": demand.rtol,
         "atol": demand.atol,

@@ -1,4 +1,4 @@
-"""Motions read from files."""
+"""Motions from files."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from shaftwork.core.errors import ModelFileError, ParameterError, SignalError
 from shaftwork.modelfiles import textfile
 from shaftwork.modelfiles.own_parts import checked_trust
 from shaftwork.modelfiles.storage import netlist_of
-from shaftwork.motionfiles.motion_formats import ARRIVING, format_of
-from shaftwork.motionfiles.motion_writing import FORMAT, PLAIN
+from shaftwork.motionfiles.files import read_motion
+from shaftwork.motionfiles.record import ARRIVING, FORMAT, PLAIN
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.compiler import Compiler
 from shaftwork.pipeline.motion_start import Ending, Repetition
@@ -65,15 +65,7 @@ def load_solution(path: str | Path, *, trust: Sequence[str] = ()) -> Solution:
         place = Path(path)
     except TypeError:
         raise ParameterError(f"path = {path!r} must be the name of a file, such as 'crane.nc'.") from None
-    _, reader = format_of(place)
-    if not place.is_file():
-        raise ModelFileError(f"There is no file '{place}'.")
-    try:
-        text, t, columns = reader(place)
-    except ImportError:
-        raise
-    except Exception as error:  # noqa: BLE001 (libraries of formats raise anything for a damaged file)
-        raise ModelFileError(f"{place} cannot be read: {error}. Give a file that Solution.save wrote.") from None
+    text, t, columns = read_motion(place)
     try:
         return solution_of(text, t, columns, trust)
     except ModelFileError as error:
@@ -90,7 +82,7 @@ def solution_of(text: str, t: Array, columns: Mapping[str, Array], trust: Any) -
         trust: packages whose parts may be imported.
 
     Raises:
-        ModelFileError: it is not what `write_motion` writes.
+        ModelFileError: it is not what `record_text` writes.
         ParameterError: `trust` has no names of packages.
     """
     trusted = checked_trust(trust)

@@ -1,4 +1,4 @@
-"""Columns of a motion and a text, in netCDF and Parquet."""
+"""Motions written to netCDF and Parquet, and read again."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from shaftwork.core.errors import ParameterError, imported
+from shaftwork.core.errors import ModelFileError, ParameterError, imported
+from shaftwork.core.files import drafted, in_a_folder
+from shaftwork.motionfiles.record import ARRIVING, Call, record_text
 from shaftwork.results.data_frames import to_pandas, to_xarray
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
@@ -17,9 +19,39 @@ RECORD = "shaftwork"
 """What a file says of the motion: a variable of netCDF, as attributes have at most 64 kB; an attribute of Parquet."""
 SLASH, INSTEAD = "/", "\N{DIVISION SLASH}"
 """In names of netCDF a slash would begin a group."""
-ARRIVING = "shaftwork arriving "
-"""Before the numbers of columns with what arrives at the ends of travelling waves, which stands behind the states."""
 Columns = Mapping[str, Array]
+
+
+def write_motion(call: Call, motion: Solution, path: Any, names: Sequence[str]) -> None:
+    """Write a motion; see `Solution.save`."""
+    place = in_a_folder(path)
+    writer, _ = _format_of(place)
+    wanted = dict.fromkeys((*motion.states, *(names or (*motion.names, *motion.places))))
+    text = record_text(motion, call)
+    try:
+        with drafted(place) as draft:
+            writer(motion, tuple(wanted), text, draft)
+    except OSError as error:
+        raise ModelFileError(f"{place} cannot be written: {error}.") from None
+
+
+def read_motion(place: Path) -> tuple[str, Array, Columns]:
+    """What a file says of a motion, its output times (k,) in s, and its quantities at these by name.
+
+    Raises:
+        MissingExtraError: a library is not installed.
+        ModelFileError: there is no such file, or it cannot be read.
+        ParameterError: another end of the name.
+    """
+    _, reader = _format_of(place)
+    if not place.is_file():
+        raise ModelFileError(f"There is no file '{place}'.")
+    try:
+        return reader(place)
+    except ImportError:
+        raise
+    except Exception as error:  # noqa: BLE001 (libraries of formats raise anything for a damaged file)
+        raise ModelFileError(f"{place} cannot be read: {error}. Give a file that Solution.save wrote.") from None
 
 
 def _write_netcdf(motion: Solution, names: Sequence[str], text: str, path: Path) -> None:
@@ -92,12 +124,7 @@ FORMATS: Mapping[str, tuple[Writer, Loader]] = {
 """By the end of a name, what writes and reads such files; netCDF 4 is HDF5."""
 
 
-def format_of(place: Path) -> tuple[Writer, Loader]:
-    """What writes and reads a file, by the end of its name.
-
-    Raises:
-        ParameterError: no end that is known.
-    """
+def _format_of(place: Path) -> tuple[Writer, Loader]:
     if place.suffix.lower() not in FORMATS:
         raise ParameterError(f"'{place.name}' has no end that is known. Take one of: {', '.join(FORMATS)}.")
     return FORMATS[place.suffix.lower()]
