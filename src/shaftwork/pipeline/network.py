@@ -12,10 +12,11 @@ from shaftwork.core.notices import muted
 from shaftwork.equations.kirchhoff import kirchhoff
 from shaftwork.equations.records import Equations, NamedPhase
 from shaftwork.network.graph import CircuitGraph
-from shaftwork.network.netlist import Netlist, NetworkBuilder
+from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import Point, Time, as_names
 from shaftwork.pipeline.compiler import Compiler, diagnose_motion, sound
 from shaftwork.pipeline.model import Model
+from shaftwork.pipeline.network_exports import NetworkExports
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ LOOP = "algebraic loop"
 """The kind of problem that `algebraic_loops="solve"` accepts."""
 
 
-class Network(NetworkBuilder):
+class Network(NetworkExports):
     """A drive train: parts joined at nodes.
 
     Examples:
@@ -338,38 +339,6 @@ class Network(NetworkBuilder):
                 return self.draw()._repr_svg_()
         except ShaftworkError:
             return None
-
-    def to_modelica(
-        self,
-        path: str | Path | None = None,
-        *,
-        form: Literal["component", "flat"] = "component",
-        library: Literal["standard", "inline"] = "standard",
-        t_end: float = 1.0,
-        initial: Mapping[str, float] | None = None,
-    ) -> str:
-        """The network in Modelica: a package whose model `Network` joins parts, or one model of its equations.
-
-        Args:
-            path: a file to which the text is written, "crane.mo"; by default none.
-            form: "component" has each part as an instance of the Modelica Standard Library where that has one, else of
-                a model of its own in the package; "flat" has parameters, states, rates and quantities.
-            library: "inline" writes the few classes of the library that are used into the package, so that tools
-                without the library run it.
-            t_end: end of the experiment, s.
-            initial: start values, as for `Model.simulate`.
-
-        Raises:
-            NetworkError: the network cannot be assembled; lists every reason.
-            CompileError: a part or a law has no such form; the message names it.
-            ParameterError: there is no such form or library, or the file cannot be written.
-        """
-        from shaftwork.modelica.modelica_export import modelica_text, write_text
-
-        text = modelica_text(self.netlist(), sound, form, library, t_end, initial)
-        if path is not None:
-            write_text(text, path)
-        return text
 
     def save(self, path: str | Path) -> None:
         """Write the network to a text file from which `load` makes the same network.
