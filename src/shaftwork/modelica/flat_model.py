@@ -16,7 +16,15 @@ from shaftwork.formulation.explicit_rows import BlockTooLargeError, Rows, explic
 from shaftwork.formulation.form import Names, StateForm
 from shaftwork.formulation.observables import Observables
 from shaftwork.modelica.component_writer import experiment
-from shaftwork.modelica.modelica_expressions import Identifiers, Printer, functions_in, number, quoted, symbols_of, unit
+from shaftwork.modelica.modelica_expressions import (
+    Identifiers,
+    ModelicaPrinter,
+    functions_in,
+    number,
+    quoted,
+    symbols_of,
+    unit,
+)
 from shaftwork.network.graph import CircuitGraph, GraphPart, resolve
 from shaftwork.network.netlist import Netlist
 
@@ -86,7 +94,9 @@ class _Flat:
         self._parameters = {name: self._names[name] for name in form.graph.parameters}
         self._states = {state.name: self._names[state.name] for state in form.states}
         values = {Symbol(name, real=True): value for name, value in form.graph.parameters.items()}
-        self._printer = Printer(symbols_of({**self._parameters, **self._states}), f"'{form.graph.name}'", values)
+        self._printer = ModelicaPrinter(
+            symbols_of({**self._parameters, **self._states}), f"'{form.graph.name}'", values
+        )
 
     def lines(self, t_end: float) -> Iterator[str]:
         """Declarations, equations and the experiment."""

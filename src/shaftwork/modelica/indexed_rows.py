@@ -14,7 +14,7 @@ FEW = 3
 
 
 @dataclass(frozen=True)
-class Place:
+class IndexedPlace:
     """A variable, or an element of an array: its name and number, 0 of what is no array."""
 
     name: str
@@ -29,12 +29,12 @@ class Place:
         return f"{self.name}[{index}{shift}]"
 
 
-Ends = tuple[Place | None, Place | None]
+Ends = tuple[IndexedPlace | None, IndexedPlace | None]
 """Where the across variables of the two ends of a branch stand; None is the reference."""
 
 
 @dataclass
-class Group:
+class RowGroup:
     """Equal branches: both ends of the next are the next in their rows.
 
     Args:
@@ -46,10 +46,10 @@ class Group:
     word: str
 
 
-def groups_of(branches: Sequence[GraphBranch], ends_of: Callable[[GraphBranch], Ends]) -> list[Group]:
+def groups_of(branches: Sequence[GraphBranch], ends_of: Callable[[GraphBranch], Ends]) -> list[RowGroup]:
     """Branches in groups, in the order of their first ones."""
-    groups: list[Group] = []
-    last: dict[object, tuple[Group, int]] = {}
+    groups: list[RowGroup] = []
+    last: dict[object, tuple[RowGroup, int]] = {}
     for number, branch in enumerate(branches, 1):
         ends = ends_of(branch)
         numbers = [0 if place is None else place.number for place in ends]
@@ -62,7 +62,7 @@ def groups_of(branches: Sequence[GraphBranch], ends_of: Callable[[GraphBranch], 
         )
         group, before = last.get(key, (None, 0))
         if group is None or first != before + 1 or not _may_repeat(branch, ends):
-            group = Group([], str(number))
+            group = RowGroup([], str(number))
             groups.append(group)
         group.branches.append(branch)
         last[key] = group, first
@@ -75,15 +75,17 @@ def _may_repeat(branch: GraphBranch, ends: Ends) -> bool:
     return simple and all(place is None or place.number for place in ends)
 
 
-def _long_or_single(group: Group) -> Iterator[Group]:
+def _long_or_single(group: RowGroup) -> Iterator[RowGroup]:
     if len(group.branches) >= FEW:
         yield group
         return
     for count, branch in enumerate(group.branches):
-        yield Group([branch], group.word if not count else f"{group.word}_{count + 1}")
+        yield RowGroup([branch], group.word if not count else f"{group.word}_{count + 1}")
 
 
-def runs_of(flows: Mapping[End, list[tuple[str, Place]]], places: Mapping[End, Place]) -> Iterator[list[End]]:
+def runs_of(
+    flows: Mapping[End, list[tuple[str, IndexedPlace]]], places: Mapping[End, IndexedPlace]
+) -> Iterator[list[End]]:
     """Ends one after the other whose balances are equal but for the index.
 
     Args:
@@ -125,7 +127,7 @@ def difference(ends: Ends, index: str = "", first: int = 0) -> str:
     return plus if minus is None else f"({plus} - {minus})"
 
 
-def total(terms: Sequence[tuple[str, Place]], index: str = "", first: int = 0) -> str:
+def total(terms: Sequence[tuple[str, IndexedPlace]], index: str = "", first: int = 0) -> str:
     """The sum of variables with factors "", "-" or "-(p.ratio) * "."""
     text = "".join(
         f"{' - ' if factor.startswith('-') else ' + '}{factor.removeprefix('-')}{place.text(index, first)}"

@@ -18,7 +18,7 @@ from shaftwork.core.domains import ELECTRICAL
 from shaftwork.core.errors import CompileError
 from shaftwork.formulation.form import StateForm
 from shaftwork.modelica.indexed_rows import difference
-from shaftwork.modelica.modelica_expressions import Printer
+from shaftwork.modelica.modelica_expressions import ModelicaPrinter
 from shaftwork.modelica.part_models import PartModel
 from shaftwork.network.graph import GraphPart, resolve
 from shaftwork.network.kinds import Kind
@@ -69,7 +69,7 @@ class _ModeModel(PartModel):
         names = {ACROSS: across, **self.symbols}
         if expression.has(INTEGRAL):
             names[INTEGRAL] = self.twist(plus, minus)
-        return Printer(names, self.title, self.values).doprint(expression)
+        return ModelicaPrinter(names, self.title, self.values).doprint(expression)
 
     @property
     def across(self) -> str:

@@ -53,7 +53,7 @@ _NOISE_NAME = re.compile(r"held_noise_(\w+)\(")
 _UNITS = {"ohm": "Ohm"}
 
 
-class Printer(RealNumbers, CodePrinter):  # type: ignore[misc]
+class ModelicaPrinter(RealNumbers, CodePrinter):  # type: ignore[misc]
     """Expressions in Modelica.
 
     Args:

@@ -10,8 +10,8 @@ from sympy import Expr, Symbol
 from shaftwork.components.branches import ACROSS, INTEGRAL, RATE, End, named_in
 from shaftwork.core.domains import ELECTRICAL, ROTATION, TRANSLATION, Domain
 from shaftwork.formulation.form import StateForm
-from shaftwork.modelica.indexed_rows import FEW, Group, Place, difference, family, groups_of, runs_of, total
-from shaftwork.modelica.modelica_expressions import Identifiers, Printer, quoted, symbols_of, unit
+from shaftwork.modelica.indexed_rows import FEW, IndexedPlace, RowGroup, difference, family, groups_of, runs_of, total
+from shaftwork.modelica.modelica_expressions import Identifiers, ModelicaPrinter, quoted, symbols_of, unit
 from shaftwork.modelica.standard_classes import CONNECTORS
 from shaftwork.network.graph import GROUND, GraphBranch, GraphPart, resolve, signals_of
 from shaftwork.network.kinds import Kind
@@ -84,7 +84,7 @@ class PartModel:
         """What flows into the part at a port."""
         return f"{self.ports[str(end)]}.{FLOWS[self.domains[str(end)]]}"
 
-    def ends_of(self, branch: GraphBranch) -> tuple[Place | None, Place | None]:
+    def ends_of(self, branch: GraphBranch) -> tuple[IndexedPlace | None, IndexedPlace | None]:
         """Where the across variables of the ends of a branch stand."""
         plus, minus = branch.template.ends
         return self.places.get(plus), self.places.get(minus)
@@ -104,22 +104,22 @@ class PartModel:
             if name in declared:
                 yield f'parameter Real {text}(unit = "{unit(declared[name].unit)}") {quoted(declared[name].meaning)};'
 
-    def _places_of_ends(self) -> dict[End, Place]:
+    def _places_of_ends(self) -> dict[End, IndexedPlace]:
         """Where the across variable of each port and inner node stands; nodes in a row share an array."""
         inner = [port.name for port in self.part.component.inner_ports()]
         row = [name for name in inner if name.isdigit()]
-        places: dict[End, Place] = {}
+        places: dict[End, IndexedPlace] = {}
         for name, domain in self.domains.items():
             word, digits = family(name)
             if len(row) >= FEW and (name in row or name in ("a", "b")):
                 numbers = {"a": 1, "b": len(row) + 2}
-                places[name] = Place(self.names[f"{domain.across.name} along"], numbers.get(name) or digits + 1)
+                places[name] = IndexedPlace(self.names[f"{domain.across.name} along"], numbers.get(name) or digits + 1)
             elif name in inner and digits and sum(family(other)[0] == word for other in inner) >= FEW:
-                places[name] = Place(self.names[f"{domain.across.name} {word}"], digits)
+                places[name] = IndexedPlace(self.names[f"{domain.across.name} {word}"], digits)
             elif domain is ELECTRICAL and name in self.ports:
-                places[name] = Place(f"{self.ports[name]}.v")
+                places[name] = IndexedPlace(f"{self.ports[name]}.v")
             else:
-                places[name] = Place(self.names.unused(f"{domain.across.name}_{name}"))
+                places[name] = IndexedPlace(self.names.unused(f"{domain.across.name}_{name}"))
         return places
 
     def _declare_ends(self) -> None:
@@ -142,9 +142,9 @@ class PartModel:
         states = frozenset(self.form.across_states)
         return any(branch.index in states and branch.template.ends == (end, None) for branch in self.branches)
 
-    def _throughs(self, groups: list[Group]) -> dict[int, Place]:
+    def _throughs(self, groups: list[RowGroup]) -> dict[int, IndexedPlace]:
         """The through variable of each branch, declared."""
-        throughs: dict[int, Place] = {}
+        throughs: dict[int, IndexedPlace] = {}
         for group in groups:
             branch, size = group.branches[0], len(group.branches)
             quantity = self.domain_of(branch).through
@@ -154,10 +154,10 @@ class PartModel:
             name = self.names.unused(stem)
             size = size if size > 1 else 0
             self.declare(name, quantity.unit, start=branch.index in self.form.through_states, size=size)
-            throughs |= {one.index: Place(name, k if size else 0) for k, one in enumerate(group.branches, 1)}
+            throughs |= {one.index: IndexedPlace(name, k if size else 0) for k, one in enumerate(group.branches, 1)}
         return throughs
 
-    def _write_law(self, group: Group, throughs: Mapping[int, Place]) -> None:
+    def _write_law(self, group: RowGroup, throughs: Mapping[int, IndexedPlace]) -> None:
         branch, size = group.branches[0], len(group.branches)
         index = "k" if size > 1 else ""
         if branch.terms:
@@ -174,14 +174,14 @@ class PartModel:
         self.equations += [f"for k in 1:{size} loop", f"  {line}", "end for;"] if index else [line]
 
     def _coupling(self, branch: GraphBranch) -> str:
-        printer = Printer(self.symbols, self.title)
+        printer = ModelicaPrinter(self.symbols, self.title)
         terms = (
             f"({printer.doprint(factor)}) * {difference((self.places.get(plus), self.places.get(minus)))}"
             for factor, plus, minus in branch.template.terms
         )
         return f"0 = {' + '.join(terms)};"
 
-    def _printed(self, branch: GraphBranch, throughs: Mapping[int, Place], across: str) -> str:
+    def _printed(self, branch: GraphBranch, throughs: Mapping[int, IndexedPlace], across: str) -> str:
         law = branch.template.law
         if branch.template.is_history:
             return self._arrived(branch, throughs)
@@ -194,10 +194,10 @@ class PartModel:
 
     def printed(self, law: Expr, names: Mapping[Symbol, str]) -> str:
         """A law as a factor."""
-        text = Printer(names, self.title, self.values).doprint(law)
+        text = ModelicaPrinter(names, self.title, self.values).doprint(law)
         return text if re.fullmatch(r"[\w.\[\]]+", text) else f"({text})"
 
-    def _reading(self, symbol: Symbol, throughs: Mapping[int, Place]) -> str:
+    def _reading(self, symbol: Symbol, throughs: Mapping[int, IndexedPlace]) -> str:
         kind, name = named_in(symbol)
         if kind == "across":
             return self.places[name].text()
@@ -207,7 +207,7 @@ class PartModel:
             return throughs[carrying[0].index].text()
         return self._integral(labelled[0])
 
-    def _arrived(self, branch: GraphBranch, throughs: Mapping[int, Place]) -> str:
+    def _arrived(self, branch: GraphBranch, throughs: Mapping[int, IndexedPlace]) -> str:
         """What comes from the other end of a line, late."""
         word = branch.template.label.rpartition("_")[0]
         histories = (other for other in self.branches if other.template.is_history and other is not branch)
@@ -238,10 +238,10 @@ class PartModel:
             return self.angle_at(plus) if minus is None else f"(-{self.angle_at(minus)})"
         return f"({self.angle_at(plus)} - {self.angle_at(minus)})"
 
-    def _balance(self, groups: list[Group], throughs: Mapping[int, Place]) -> None:
+    def _balance(self, groups: list[RowGroup], throughs: Mapping[int, IndexedPlace]) -> None:
         """What flows into a port passes on through branches, and at inner nodes nothing is left."""
-        flows: dict[End, list[tuple[str, Place]]] = {end: [] for end in self.places}
-        printer = Printer(self.symbols, self.title)
+        flows: dict[End, list[tuple[str, IndexedPlace]]] = {end: [] for end in self.places}
+        printer = ModelicaPrinter(self.symbols, self.title)
         for branch in (branch for group in groups for branch in group.branches):
             for factor, plus, minus in branch.template.balances or ((None, *branch.template.ends),):
                 scale = "" if factor is None else f"({printer.doprint(factor)}) * "

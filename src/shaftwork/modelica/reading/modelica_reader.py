@@ -11,10 +11,10 @@ from typing import Any
 from shaftwork.components.mechanics import Ground
 from shaftwork.core.errors import ModelFileError, ShaftworkError
 from shaftwork.modelica.modelica_expressions import Identifiers
-from shaftwork.modelica.reading.modelica_syntax import ClassText, Declaration, Modifier, parse
-from shaftwork.modelica.reading.modelica_terminals import Terminals
+from shaftwork.modelica.reading.modelica_syntax import ClassText, Declaration, Modification, parse
+from shaftwork.modelica.reading.modelica_terminals import JoinedTerminals
 from shaftwork.modelica.reading.modelica_tokens import LONGEST, fault
-from shaftwork.modelica.reading.modelica_values import Values
+from shaftwork.modelica.reading.modelica_values import ModelicaValues
 from shaftwork.modelica.reading.read_classes import (
     BLOCKS,
     CLASSES,
@@ -149,8 +149,8 @@ class _Reading:
         names = [*filter(None, within.split(".")), *(one.name for one in outer)]
         self._around = [".".join(names[:k]) for k in range(len(names), 0, -1)]
         terms = {d.name: d.value for one in (*outer, text) for d in one.declarations if _is_parameter(d)}
-        self._values = Values(terms)
-        self._nodes, self._places = Terminals(), Terminals()
+        self._values = ModelicaValues(terms)
+        self._nodes, self._places = JoinedTerminals(), JoinedTerminals()
         self._signals: dict[str, Any] = {}
         self._instances: dict[str, _Instance] = {}
         names = [declaration.name for declaration in text.declarations]
@@ -223,8 +223,8 @@ class _Reading:
         candidates = [f"{self._imports[first]}{dot}{rest}"] if first in self._imports else []
         candidates += [f"{self._imports['*']}.{name}"] if "*" in self._imports else []
         candidates += [name, *(f"{place}.{name}" for place in self._around)]
-        known = (*CLASSES, *(f"{BLOCKS}.{block}" for block in SIGNALS))
-        return next((candidate for candidate in candidates if candidate in known), name)
+        classes = (*CLASSES, *(f"{BLOCKS}.{block}" for block in SIGNALS))
+        return next((candidate for candidate in candidates if candidate in classes), name)
 
     def _modifiers(
         self, declaration: Declaration, defaults: Mapping[str, Any]
@@ -247,7 +247,7 @@ class _Reading:
                 )
         return values, starts
 
-    def _start(self, modifier: Modifier) -> dict[str, float]:
+    def _start(self, modifier: Modification) -> dict[str, float]:
         inner = {one.name: one for one in modifier.inner}
         fixed = inner.get("fixed")
         begins = inner.get("start")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from shaftwork.modelica.reading.modelica_tokens import Cursor, fault, tokens_of_text
+from shaftwork.modelica.reading.modelica_tokens import TokenCursor, fault, tokens_of_text
 
 CLASSES = ("model", "block", "package", "class", "connector", "record", "function", "type", "operator")
 _BEFORE_CLASSES = ("encapsulated", "partial", "final", "redeclare", "replaceable", "inner", "outer", "pure", "impure")
@@ -12,7 +12,7 @@ _PREFIXES = ("parameter", "constant", "final", "inner", "outer", "input", "outpu
 
 
 @dataclass(frozen=True)
-class Term:
+class SyntaxTerm:
     """An expression: an operator, a function, a name or a literal.
 
     Args:
@@ -24,17 +24,17 @@ class Term:
 
     kind: str
     value: str = ""
-    parts: tuple[Term, ...] = ()
+    parts: tuple[SyntaxTerm, ...] = ()
     line: int = 0
 
 
 @dataclass(frozen=True)
-class Modifier:
+class Modification:
     """name(inner...) = value in a declaration."""
 
     name: str
-    value: Term | None
-    inner: tuple[Modifier, ...]
+    value: SyntaxTerm | None
+    inner: tuple[Modification, ...]
     line: int
 
 
@@ -56,9 +56,9 @@ class Declaration:
     prefixes: tuple[str, ...]
     type: str
     name: str
-    modifiers: tuple[Modifier, ...]
-    value: Term | None
-    condition: Term | None
+    modifiers: tuple[Modification, ...]
+    value: SyntaxTerm | None
+    condition: SyntaxTerm | None
     line: int
     is_array: bool = False
 
@@ -75,7 +75,7 @@ class ClassText:
     imports: dict[str, str] = field(default_factory=dict)
     classes: list[ClassText] = field(default_factory=list)
     faults: list[tuple[int, str]] = field(default_factory=list)
-    t_end: Term | None = None
+    t_end: SyntaxTerm | None = None
 
 
 def parse(text: str) -> tuple[str, tuple[ClassText, ...]]:
@@ -87,7 +87,7 @@ def parse(text: str) -> tuple[str, tuple[ClassText, ...]]:
     return _Parser(tuple(tokens_of_text(text))).file()
 
 
-class _Parser(Cursor):
+class _Parser(TokenCursor):
     """Goes through the tokens by the grammar."""
 
     # classes
@@ -270,9 +270,9 @@ class _Parser(Cursor):
         self._skip_to("]")
         return True
 
-    def _modifiers(self) -> tuple[Modifier, ...]:
+    def _modifiers(self) -> tuple[Modification, ...]:
         self._expect("(")
-        modifiers: list[Modifier] = []
+        modifiers: list[Modification] = []
 
         def read() -> None:
             while not self._at(")"):
@@ -283,7 +283,7 @@ class _Parser(Cursor):
                 inner = self._modifiers() if self._at("(") else ()
                 value = self.expression() if self._accept("=") else None
                 self._comment()
-                modifiers.append(Modifier(name, value, inner, line))
+                modifiers.append(Modification(name, value, inner, line))
                 if not self._accept(","):
                     break
 
@@ -293,13 +293,13 @@ class _Parser(Cursor):
 
     # expressions, by rising precedence
 
-    def expression(self) -> Term:
+    def expression(self) -> SyntaxTerm:
         """An expression."""
-        terms: list[Term] = []
+        terms: list[SyntaxTerm] = []
         self._deeper(lambda: terms.append(self._choice()))
         return terms[0]
 
-    def _choice(self) -> Term:
+    def _choice(self) -> SyntaxTerm:
         line = self._next.line
         if not self._accept("if", "elseif"):
             return self._binary(0)
@@ -310,30 +310,34 @@ class _Parser(Cursor):
         if other is None:
             self._expect("else")
             other = self.expression()
-        return Term("if", "", (condition, then, other), line)
+        return SyntaxTerm("if", "", (condition, then, other), line)
 
-    def _binary(self, level: int) -> Term:
+    def _binary(self, level: int) -> SyntaxTerm:
         if level == len(_LEVELS):
             return self._power()
         line = self._next.line
         if _LEVELS[level] == ("not",):
-            return Term("not", "", (self._binary(level + 1),), line) if self._accept("not") else self._binary(level + 1)
+            return (
+                SyntaxTerm("not", "", (self._binary(level + 1),), line)
+                if self._accept("not")
+                else self._binary(level + 1)
+            )
         if "+" in _LEVELS[level] and (sign := self._accept("-", "+")):
             first = self._binary(level + 1)
-            left = Term("negative", "", (first,), line) if sign.text == "-" else first
+            left = SyntaxTerm("negative", "", (first,), line) if sign.text == "-" else first
         else:
             left = self._binary(level + 1)
         while sign := self._accept(*_LEVELS[level]):
-            left = Term(sign.text.removeprefix("."), "", (left, self._binary(level + 1)), line)
+            left = SyntaxTerm(sign.text.removeprefix("."), "", (left, self._binary(level + 1)), line)
         return left
 
-    def _power(self) -> Term:
+    def _power(self) -> SyntaxTerm:
         line, base = self._next.line, self._primary()
         if self._accept("^", ".^"):
-            return Term("^", "", (base, self._primary()), line)
+            return SyntaxTerm("^", "", (base, self._primary()), line)
         return base
 
-    def _primary(self) -> Term:
+    def _primary(self) -> SyntaxTerm:
         token = self._next
         if self._accept("("):
             inner = self.expression()
@@ -343,17 +347,17 @@ class _Parser(Cursor):
             closing = "}" if opened.text == "{" else "]"
             return self._array(closing, token.line)
         if token.kind in ("number", "text"):
-            return Term(token.kind, self._take().text, (), token.line)
+            return SyntaxTerm(token.kind, self._take().text, (), token.line)
         if self._accept("true", "false"):
-            return Term("bool", token.text, (), token.line)
+            return SyntaxTerm("bool", token.text, (), token.line)
         name = self._dotted()
         if self._accept("("):
-            return Term("call", name, self._array(")", token.line).parts, token.line)
-        return Term("name", name, (), token.line)
+            return SyntaxTerm("call", name, self._array(")", token.line).parts, token.line)
+        return SyntaxTerm("name", name, (), token.line)
 
-    def _array(self, closing: str, line: int) -> Term:
-        """Values up to a bracket; rows between semicolons are arrays in an array."""
-        rows: list[list[Term]] = [[]]
+    def _array(self, closing: str, line: int) -> SyntaxTerm:
+        """ModelicaValues up to a bracket; rows between semicolons are arrays in an array."""
+        rows: list[list[SyntaxTerm]] = [[]]
         while not self._accept(closing):
             named = self._next.kind == "name" and self._tokens[self._place + 1].text == "="
             if named:
@@ -361,15 +365,15 @@ class _Parser(Cursor):
             value = self.expression()
             if self._accept(":"):
                 value, named = self.expression(), True
-            rows[-1].append(Term("named or range", "", (value,), value.line) if named else value)
+            rows[-1].append(SyntaxTerm("named or range", "", (value,), value.line) if named else value)
             if self._accept(";"):
                 rows.append([])
             elif not self._accept(","):
                 self._expect(closing)
                 break
         if closing != "]":
-            return Term("array", "", tuple(rows[0]), line)
-        return Term("array", "", tuple(Term("array", "", tuple(row), line) for row in rows), line)
+            return SyntaxTerm("array", "", tuple(rows[0]), line)
+        return SyntaxTerm("array", "", tuple(SyntaxTerm("array", "", tuple(row), line) for row in rows), line)
 
 
 _LEVELS: tuple[tuple[str, ...], ...] = (

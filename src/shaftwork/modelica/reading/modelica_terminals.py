@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 
-class Terminals:
-    """Terminals that are joined."""
+class JoinedTerminals:
+    """JoinedTerminals that are joined."""
 
     def __init__(self) -> None:
         self._parents: dict[str, str] = {}

@@ -23,7 +23,7 @@ LONGEST = 2_000_000
 
 
 @dataclass(frozen=True)
-class Token:
+class ModelicaToken:
     """A word, number, text or sign, and its line."""
 
     kind: str
@@ -36,7 +36,7 @@ def fault(line: int, what: str) -> ModelFileError:
     return ModelFileError(f"line {line}: {what}")
 
 
-def tokens_of_text(text: str) -> Iterator[Token]:
+def tokens_of_text(text: str) -> Iterator[ModelicaToken]:
     """The words of a text.
 
     Raises:
@@ -52,27 +52,27 @@ def tokens_of_text(text: str) -> Iterator[Token]:
             raise fault(line, f"{text[place]!r} begins nothing that Modelica has.")
         kind = str(match.lastgroup)
         if kind != "space":
-            yield Token(kind, match.group(), line)
+            yield ModelicaToken(kind, match.group(), line)
         line += match.group().count("\n")
         place = match.end()
-    yield Token("end", "the end of the file", line)
+    yield ModelicaToken("end", "the end of the file", line)
 
 
-class Cursor:
+class TokenCursor:
     """Reads tokens from the first to the last.
 
     Args:
         tokens: of a text; the last one is its end.
     """
 
-    def __init__(self, tokens: Sequence[Token]) -> None:
+    def __init__(self, tokens: Sequence[ModelicaToken]) -> None:
         self._tokens, self._place, self._depth = tokens, 0, 0
 
     @property
-    def _next(self) -> Token:
+    def _next(self) -> ModelicaToken:
         return self._tokens[self._place]
 
-    def _take(self) -> Token:
+    def _take(self) -> ModelicaToken:
         token = self._next
         self._place += token.kind != "end"
         return token
@@ -80,10 +80,10 @@ class Cursor:
     def _at(self, *words: str) -> bool:
         return self._next.text in words and self._next.kind in ("name", "sign")
 
-    def _accept(self, *words: str) -> Token | None:
+    def _accept(self, *words: str) -> ModelicaToken | None:
         return self._take() if self._at(*words) else None
 
-    def _expect(self, word: str) -> Token:
+    def _expect(self, word: str) -> ModelicaToken:
         if not self._at(word):
             raise fault(self._next.line, f"'{word}' is expected, and there is {self._shown}.")
         return self._take()
@@ -92,7 +92,7 @@ class Cursor:
     def _shown(self) -> str:
         return self._next.text if self._next.kind == "end" else f"'{self._next.text[:30]}'"
 
-    def _name(self) -> Token:
+    def _name(self) -> ModelicaToken:
         if self._next.kind != "name":
             raise fault(self._next.line, f"a name is expected, and there is {self._shown}.")
         return self._take()

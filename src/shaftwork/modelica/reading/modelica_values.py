@@ -11,7 +11,7 @@ import sympy
 from shaftwork.components.laws import larger, smaller
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ModelFileError
-from shaftwork.modelica.reading.modelica_syntax import Term
+from shaftwork.modelica.reading.modelica_syntax import SyntaxTerm
 from shaftwork.modelica.reading.modelica_tokens import fault
 
 _CONSTANTS = {"pi": math.pi, "eps": 2.220446049250313e-16, "small": 1e-60, "inf": 1e60, "g_n": 9.80665, "e": math.e}
@@ -41,17 +41,17 @@ LARGEST = 1e100
 """A larger number is a slip, and its powers take long."""
 
 
-class Values:
+class ModelicaValues:
     """The parameters of a model, each worked out when it is first needed.
 
     Args:
         terms: by name.
     """
 
-    def __init__(self, terms: Mapping[str, Term | None]) -> None:
+    def __init__(self, terms: Mapping[str, SyntaxTerm | None]) -> None:
         self._terms, self._results, self._open = dict(terms), dict[str, Any](), list[str]()
 
-    def of(self, term: Term) -> Any:
+    def of(self, term: SyntaxTerm) -> Any:
         """The value of an expression: a float, bool, str, list, or a sympy expression of time.
 
         Raises:
@@ -64,7 +64,7 @@ class Values:
                 raise
             raise fault(term.line, f"the expression has no value: {str(error)[:80] or type(error).__name__}.") from None
 
-    def _plain(self, value: Any, term: Term) -> Any:
+    def _plain(self, value: Any, term: SyntaxTerm) -> Any:
         if isinstance(value, bool | str | list):
             return value
         expression = sympy.sympify(value)
@@ -79,7 +79,7 @@ class Values:
             raise fault(term.line, f"the number {number:g} is too large.")
         return number
 
-    def _value(self, term: Term) -> Any:
+    def _value(self, term: SyntaxTerm) -> Any:
         if term.kind == "number":
             return float(term.value)
         if term.kind == "text":
@@ -99,7 +99,7 @@ class Values:
             return _RELATIONS[term.kind](*values)
         return self._operation(term, values)
 
-    def _operation(self, term: Term, values: list[Any]) -> Any:
+    def _operation(self, term: SyntaxTerm, values: list[Any]) -> Any:
         match term.kind, values:
             case "negative", [one]:
                 return -one
@@ -119,7 +119,7 @@ class Values:
                 return one**other
         raise fault(term.line, "the expression is not one of numbers, parameters and time.")
 
-    def _choice(self, term: Term) -> Any:
+    def _choice(self, term: SyntaxTerm) -> Any:
         condition, *branches = term.parts
         chosen = self.of(condition)
         if isinstance(chosen, bool):
@@ -127,13 +127,13 @@ class Values:
         then, other = map(self.of, branches)
         return sympy.Piecewise((then, chosen), (other, True))
 
-    def _call(self, term: Term, values: list[Any]) -> Any:
+    def _call(self, term: SyntaxTerm, values: list[Any]) -> Any:
         name = term.value.rpartition(".")[2]
         if name not in _FUNCTIONS:
             raise fault(term.line, f"the function '{term.value}' is not read. There are: {', '.join(_FUNCTIONS)}.")
         return _FUNCTIONS[name](*values)
 
-    def _named(self, term: Term) -> Any:
+    def _named(self, term: SyntaxTerm) -> Any:
         name = term.value
         if name in self._results:
             return self._results[name]
