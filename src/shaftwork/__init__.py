@@ -99,6 +99,8 @@ if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
     )
     from shaftwork.core.parameters import parameter as parameter
     from shaftwork.equations.notations import Inverse as Inverse, Notation as Notation
+    from shaftwork.fmu.fmu_parts import FMUSpeed as FMUSpeed, FMUTorque as FMUTorque
+    from shaftwork.fmu.foreign_unit import FMU as FMU
     from shaftwork.pipeline.model import Model as Model
     from shaftwork.pipeline.network import Network as Network
     from shaftwork.reporting.report import Report as Report, report as report
@@ -156,6 +158,8 @@ _HOME = {
     ),
     "shaftwork.core.parameters": ("parameter",),
     "shaftwork.equations.notations": ("Inverse", "Notation"),
+    "shaftwork.fmu.fmu_parts": ("FMUSpeed", "FMUTorque"),
+    "shaftwork.fmu.foreign_unit": ("FMU",),
     "shaftwork.pipeline.model": ("Model",),
     "shaftwork.pipeline.network": ("Network",),
     "shaftwork.reporting.report": ("Report", "report"),

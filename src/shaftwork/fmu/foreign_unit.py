@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+import shutil
 import threading
+import weakref
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import mkdtemp
 from types import MappingProxyType
 from typing import Any, Self
 
@@ -201,9 +203,10 @@ class _Instance:
     def __init__(self, fmu: FMU, input_name: str, output_name: str) -> None:
         fmpy, simulation = (imported(name, "fmi", "sw.FMU") for name in ("fmpy", "fmpy.simulation"))
         description = fmu.description
-        self._folder = TemporaryDirectory(prefix="shaftwork-fmu-", ignore_cleanup_errors=True)
-        fmpy.extract(str(fmu.path), unzipdir=self._folder.name)
-        self._unit = simulation.instantiate_fmu(self._folder.name, description, fmi_type="ModelExchange")
+        folder = mkdtemp(prefix="shaftwork-fmu-")
+        weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+        fmpy.extract(str(fmu.path), unzipdir=folder)
+        self._unit = simulation.instantiate_fmu(folder, description, fmi_type="ModelExchange")
         references = {v.name: v.valueReference for v in description.modelVariables}
         self._input, self._output = [references[input_name]], [references[output_name]]
         newer = str(description.fmiVersion).startswith("3.")
