@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
@@ -280,6 +281,42 @@ class Model(CompiledModel):
             return self._variant(values).linearize(at, inputs=inputs, outputs=outputs, t=t)
         with muted(PulsationWarning):  # matrices are those of a moment
             return self.near(at, t, inputs, outputs, values)
+
+    def to_fmu(
+        self,
+        path: str | Path,
+        *,
+        version: Literal["3.0", "2.0"] = "3.0",
+        kind: Literal["both", "model exchange", "co-simulation"] = "both",
+        inputs: Sequence[str] = (),
+        outputs: Sequence[str] | None = None,
+        t_end: float = 10.0,
+        binary: bool = True,
+    ) -> None:
+        """Write the model as a functional mock-up unit (FMI), which other tools of simulation import.
+
+        All that simulates is in it, with modes and events; its source code is inside, so that it can be compiled for
+        another machine. The states of all parts and the parameters keep their names.
+
+        Args:
+            path: of the file, "crane.fmu".
+            version: of FMI.
+            kind: for "model exchange" the importing tool integrates; for "co-simulation" the unit does so itself, by a
+                method of order 8 that ends its steps at events.
+            inputs: parameters that the importing tool gives over time, such as what a source gives, "motor.tau".
+            outputs: quantities; by default all.
+            t_end: end of a usual motion, s, which the unit proposes.
+            binary: whether it is compiled for this machine, by the C compiler that is found here.
+
+        Raises:
+            ParameterError: an argument is none of those that there are.
+            SignalError: there is no such input or output.
+            CompileError: the network has travelling waves or other things of which there is no C code; or there is no C
+                compiler.
+        """
+        from shaftwork.fmu.export_unit import export_unit
+
+        export_unit(self, path, version, kind, inputs, outputs, t_end, binary=binary)
 
     def near(self, at: Point, t: Time, inputs: Names, outputs: Names = None, values: Given = None) -> LinearModel:
         """The same for values of parameters that have been looked at and change no structure."""

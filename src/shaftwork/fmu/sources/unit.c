@@ -15,7 +15,10 @@ enum {
 };
 
 /* Of each state among all that is stored, where its start value stands. */
-static const int UNIT_STORE[] = UNIT_STORES;
+static const int UNIT_STORE[] = UNIT_STORES_OF_STATES;
+
+/* Of each output among those of the model. */
+static const int UNIT_OUTPUT[] = UNIT_PLACES_OF_OUTPUTS;
 
 /* Room for what is computed: C has no arrays of no elements. */
 enum { ROOM = END + 1 };
@@ -83,6 +86,7 @@ int unit_enter(Unit *unit, UnitMode mode)
 static int computed(Unit *unit, double *values)
 {
     Model copy;
+    double outputs[UNIT_ALL_OUTPUTS + 1];
     const Model *model = &unit->state.model;
     if (unit->state.mode == UNIT_INSTANTIATED) {
         copy = unit->state.model;
@@ -93,7 +97,10 @@ static int computed(Unit *unit, double *values)
     }
     memcpy(&values[FIRST_STATE], model->x, UNIT_STATES * sizeof(double));
     MODEL(rhs)(model, model->t, model->x, &values[FIRST_RATE]);
-    MODEL(outputs)(model, model->t, model->x, &values[FIRST_OUTPUT]);
+    MODEL(outputs)(model, model->t, model->x, outputs);
+    for (int i = 0; i < UNIT_OUTPUTS; i++) {
+        values[FIRST_OUTPUT + i] = outputs[UNIT_OUTPUT[i]];
+    }
     MODEL(guards)(model, model->t, model->x, &values[FIRST_INDICATOR]);
     return 0;
 }
