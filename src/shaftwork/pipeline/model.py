@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -357,6 +358,29 @@ class Model(CompiledModel):
         if not isinstance(parameters, Mapping):
             raise ParameterError(f"parameters = {parameters!r} must map names to values, such as {{'shaft.c': 3e4}}.")
         return checked_parameters(self.netlist, parameters)
+
+    def with_values(self, values: Mapping[str, Any]) -> Model:
+        """The model of the same network with other values, "part.parameter", whatever they change."""
+        return self._rebuild(self.netlist.with_values(values))
+
+    def to_c(
+        self, folder: str | Path, *, name: str | None = None, inputs: Names = (), outputs: Names = None
+    ) -> tuple[Path, ...]:
+        """Write the model as C code: NAME.h, NAME.c and an example main.c; returns their paths.
+
+        Args:
+            folder: is made where there is none.
+            name: of the model in C; by default that of the network.
+            inputs: parameters that the program sets as it runs, "motor.tau", in place of their laws.
+            outputs: any quantities; by default all but energies and powers.
+
+        Raises:
+            CompileError: there is no such code, as of travelling waves; says why.
+            ParameterError, SignalError: a name is none.
+        """
+        from shaftwork.ccode.export import c_code
+
+        return c_code(self, name=name, inputs=inputs or (), outputs=outputs).write(folder)
 
     def _variant(self, values: Mapping[str, float]) -> Model:
         """The model of the same network with other values where these change its structure; the last few are kept."""
