@@ -6,13 +6,12 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
-from shaftwork.codegen.compiled_model import CompiledModel
 from shaftwork.codegen.model_observer import ModelObserver
 from shaftwork.codegen.start_values import initial_state, with_others
 from shaftwork.codegen.undefined_laws import refuse_vanishing
@@ -41,6 +40,7 @@ from shaftwork.pipeline.arguments import (
     step_limit,
     time_span,
 )
+from shaftwork.pipeline.exported_model import ExportedModel
 from shaftwork.pipeline.implicit import IMPLICIT, PRESCRIBED, solve_loops, start_of_loops, without_states
 from shaftwork.pipeline.motion_start import (
     Ending,
@@ -64,7 +64,7 @@ VARIANTS = 8
 """Models of other structure, and choices of an engine, that are kept for later calls."""
 
 
-class Model(CompiledModel):
+class Model(ExportedModel):
     """A network as a fast function of time, states and parameters, ready to be simulated again and again.
 
     Args:
@@ -282,42 +282,6 @@ class Model(CompiledModel):
         with muted(PulsationWarning):  # matrices are those of a moment
             return self.near(at, t, inputs, outputs, values)
 
-    def to_fmu(
-        self,
-        path: str | Path,
-        *,
-        version: Literal["3.0", "2.0"] = "3.0",
-        kind: Literal["both", "model exchange", "co-simulation"] = "both",
-        inputs: Sequence[str] = (),
-        outputs: Sequence[str] | None = None,
-        t_end: float = 10.0,
-        binary: bool = True,
-    ) -> None:
-        """Write the model as a functional mock-up unit (FMI), which other tools of simulation import.
-
-        All that simulates is in it, with modes and events; its source code is inside, so that it can be compiled for
-        another machine. The states of all parts and the parameters keep their names.
-
-        Args:
-            path: of the file, "crane.fmu".
-            version: of FMI.
-            kind: for "model exchange" the importing tool integrates; for "co-simulation" the unit does so itself, by a
-                method of order 8 that ends its steps at events.
-            inputs: parameters that the importing tool gives over time, such as what a source gives, "motor.tau".
-            outputs: quantities; by default all.
-            t_end: end of a usual motion, s, which the unit proposes.
-            binary: whether it is compiled for this machine, by the C compiler that is found here.
-
-        Raises:
-            ParameterError: an argument is none of those that there are.
-            SignalError: there is no such input or output.
-            CompileError: the network has travelling waves or other things of which there is no C code; or there is no C
-                compiler.
-        """
-        from shaftwork.fmu.export_unit import export_unit
-
-        export_unit(self, path, version, kind, inputs, outputs, t_end, binary=binary)
-
     def near(self, at: Point, t: Time, inputs: Names, outputs: Names = None, values: Given = None) -> LinearModel:
         """The same for values of parameters that have been looked at and change no structure."""
         from shaftwork.frequency.analysis import linearized
@@ -394,6 +358,29 @@ class Model(CompiledModel):
         if not isinstance(parameters, Mapping):
             raise ParameterError(f"parameters = {parameters!r} must map names to values, such as {{'shaft.c': 3e4}}.")
         return checked_parameters(self.netlist, parameters)
+
+    def with_values(self, values: Mapping[str, Any]) -> Model:
+        """The model of the same network with other values, "part.parameter", whatever they change."""
+        return self._rebuild(self.netlist.with_values(values))
+
+    def to_c(
+        self, folder: str | Path, *, name: str | None = None, inputs: Names = (), outputs: Names = None
+    ) -> tuple[Path, ...]:
+        """Write the model as C code: NAME.h, NAME.c and an example main.c; returns their paths.
+
+        Args:
+            folder: is made where there is none.
+            name: of the model in C; by default that of the network.
+            inputs: parameters that the program sets as it runs, "motor.tau", in place of their laws.
+            outputs: any quantities; by default all but energies and powers.
+
+        Raises:
+            CompileError: there is no such code, as of travelling waves; says why.
+            ParameterError, SignalError: a name is none.
+        """
+        from shaftwork.ccode.export import c_code
+
+        return c_code(self, name=name, inputs=inputs or (), outputs=outputs).write(folder)
 
     def _variant(self, values: Mapping[str, float]) -> Model:
         """The model of the same network with other values where these change its structure; the last few are kept."""
