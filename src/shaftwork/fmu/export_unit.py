@@ -172,7 +172,9 @@ def _write(place: Path, members: Mapping[str, bytes]) -> None:
     try:
         with zipfile.ZipFile(draft, "w", zipfile.ZIP_DEFLATED) as archive:
             for name, data in members.items():
-                archive.writestr(zipfile.ZipInfo(name, _DAY), data, zipfile.ZIP_DEFLATED)
+                member = zipfile.ZipInfo(name, _DAY)
+                member.external_attr = 0o644 << 16
+                archive.writestr(member, data, zipfile.ZIP_DEFLATED)
         draft.replace(place)
     finally:
         draft.unlink(missing_ok=True)
