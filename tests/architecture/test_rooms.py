@@ -30,17 +30,20 @@ USES = {
     "reporting": "sw.report(net, sections=['parts'])",
     "torsional": "sw.torsional.Section",
     "live": "sw.live.Session(net, t_end=0.1)",
+    "fmu": "net.compile().to_fmu(folder / 'net.fmu', binary=False)",
 }
 """By feature, something small that takes it."""
 
 NEEDS = {
     "reporting": ("latex", "drawing", "modelfiles"),
     "live": ("reporting", "latex", "drawing", "modelfiles", "frequency", "animation"),
+    "fmu": ("ccode",),
 }
 """By feature, those that it is made of."""
 
 JOINS = {
     "animation": ("shaftwork.live",),
+    "ccode": ("shaftwork.fmu.export_unit",),
     "drawing": ("shaftwork.reporting", "shaftwork.live"),
     "modelfiles": ("shaftwork.reporting", "shaftwork.live"),
     "reporting": ("shaftwork.live",),

@@ -47,6 +47,7 @@ int fmi2GetContinuousStates(void *c, double *x, size_t n) { memcpy(x, ((Unit *)c
 int fmi2GetNominalsOfContinuousStates(void *c, double *x, size_t n) { x[0] = x[1] = 1; return 0; }
 """
 
+_PARAMETER = '<ScalarVariable name="{}" valueReference="{}" causality="parameter" variability="fixed">'
 DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName="unit" guid="{{1}}" numberOfEventIndicators="{indicators}">
 <{kind} modelIdentifier="unit"/>
@@ -56,9 +57,9 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 <ScalarVariable name="der(twist)" valueReference="3"><Real derivative="1"/></ScalarVariable>
 <ScalarVariable name="der(w1)" valueReference="4"><Real derivative="2"/></ScalarVariable>
 <ScalarVariable name="u" valueReference="5" causality="input"><Real start="0"/></ScalarVariable>
-<ScalarVariable name="J" valueReference="6" causality="parameter" variability="fixed"><Real start="2"/></ScalarVariable>
-<ScalarVariable name="c" valueReference="7" causality="parameter" variability="fixed"><Real start="50"/></ScalarVariable>
-<ScalarVariable name="d" valueReference="8" causality="parameter" variability="fixed"><Real start="0.5"/></ScalarVariable>
+{J}<Real start="2"/></ScalarVariable>
+{c}<Real start="50"/></ScalarVariable>
+{d}<Real start="0.5"/></ScalarVariable>
 <ScalarVariable name="tau" valueReference="9" causality="{torque}"><Real/></ScalarVariable>
 </ModelVariables>
 <ModelStructure>
@@ -88,6 +89,7 @@ def zipped(path: Path, **says: str) -> Path:
         **says: what its description says, `TORQUE` or `SPEED`, and its kind and number of indicators.
     """
     words = {"kind": "ModelExchange", "indicators": "0", **says}
+    words |= {name: _PARAMETER.format(name, number) for number, name in enumerate("Jcd", 6)}
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", DESCRIPTION.format(**words))
     return path

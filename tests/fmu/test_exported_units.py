@@ -78,13 +78,13 @@ def test_the_validator_finds_nothing(unit: Units, version: str) -> None:
 def test_names_that_are_no_identifiers_are_flat(tmp_path: Path) -> None:
     net = sw.Network("Zahnräder & Wellen <1>")
     net.add(sw.TorqueSource("Motor 1", tau=1.0), "Welle 1")
-    net.add(sw.Inertia("Läufer \"A\"", J=2.0), "Welle 1")
+    net.add(sw.Inertia('Läufer "A"', J=2.0), "Welle 1")
     net.compile().to_fmu(tmp_path / "unit.fmu")
     assert validate_fmu(str(tmp_path / "unit.fmu")) == []
     description = fmpy.read_model_description(str(tmp_path / "unit.fmu"))
     assert description.variableNamingConvention == "flat"
     assert description.modelName == "Zahnräder & Wellen <1>"
-    assert "Läufer \"A\".J" in {variable.name for variable in description.modelVariables}
+    assert 'Läufer "A".J' in {variable.name for variable in description.modelVariables}
 
 
 @pytest.mark.parametrize("version", VERSIONS)
@@ -301,7 +301,10 @@ def test_our_own_unit_is_a_part_of_a_network(tmp_path: Path) -> None:
     net = sw.Network("with a unit")
     net.add(sw.TorqueSource("motor", tau=10.0), "rotor")
     net.add(sw.Inertia("J1", J=1.5), "rotor")
-    net.add(sw.FMUTorque("rest", fmu=sw.FMU(tmp_path / "half.fmu", speed="drive.omega", torque="shaft.tau"), gain=-1.0), "rotor")
+    net.add(
+        sw.FMUTorque("rest", fmu=sw.FMU(tmp_path / "half.fmu", speed="drive.omega", torque="shaft.tau"), gain=-1.0),
+        "rotor",
+    )
     whole = sw.Network("whole")
     whole.add(sw.TorqueSource("motor", tau=10.0), "rotor")
     whole.add(sw.Inertia("J1", J=1.5), "rotor")

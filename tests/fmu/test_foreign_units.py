@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import pickle
 import shutil
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -92,7 +94,7 @@ def test_the_gain_multiplies_the_torque(spring: Path) -> None:
 
 def test_networks_with_units_travel(spring: Path) -> None:
     net = with_spring(spring)
-    again = pickle.loads(pickle.dumps(net))
+    again = pickle.loads(pickle.dumps(net))  # noqa: S301 (of our own making)
     assert (again.simulate(0.2)["J1.omega"] == net.simulate(0.2)["J1.omega"]).all()
 
 
@@ -109,7 +111,7 @@ def test_no_model_file_holds_a_unit(spring: Path, tmp_path: Path) -> None:
     with pytest.raises(sw.ModelFileError, match="program that would run"):
         with_spring(spring).save(tmp_path / "net.toml")
     (tmp_path / "net.toml").write_text(
-        f'format = 1\nname = "n"\n\n[[part]]\ntype = "FMUTorque"\nname = "u"\nnodes = ["r"]\nfmu = "FMU(\'{spring}\')"\n'
+        'format = 1\nname = "n"\n\n[[part]]\ntype = "FMUTorque"\nname = "u"\nnodes = ["r"]\nfmu = "FMU(1)"\n'
     )
     with pytest.raises(sw.ModelFileError, match="line 8"):
         sw.Network.load(tmp_path / "net.toml")
@@ -148,12 +150,12 @@ def test_what_a_right_hand_side_cannot_evaluate_is_refused(tmp_path: Path, says:
         sw.FMU(zipped(tmp_path / "unit.fmu", **says), speed="u", torque="tau")
 
 
-def test_a_unit_in_the_wrong_role_is_refused(spring: Path, inertia: Path, tmp_path: Path) -> None:
+def test_a_unit_in_the_wrong_role_is_refused(spring: Path, tmp_path: Path) -> None:
     with pytest.raises(sw.ParameterError, match="speed = 'tau' must be an input and torque = 'u' an output"):
         sw.FMUTorque("rest", fmu=sw.FMU(spring, speed="tau", torque="u"))
     with pytest.raises(sw.ParameterError, match="algebraic loop"):
         sw.FMUSpeed("rest", fmu=sw.FMU(spring, speed="tau", torque="u"))
-    with pytest.raises(sw.ParameterError, match="fmu=sw.FMU"):
+    with pytest.raises(sw.ParameterError, match=r"fmu=sw\.FMU"):
         sw.FMUTorque("rest", fmu=str(spring))
     with pytest.raises(sw.ParameterError, match="No such file"):
         sw.FMU(tmp_path / "none.fmu", speed="u", torque="tau")
@@ -167,16 +169,10 @@ def test_a_unit_in_the_wrong_role_is_refused(spring: Path, inertia: Path, tmp_pa
 def test_a_mutated_description_is_read_or_refused_by_name(
     tmp_path_factory: pytest.TempPathFactory, place: int, length: int, text: str
 ) -> None:
-    import zipfile
-
     path = zipped(tmp_path_factory.mktemp("mutated") / "unit.fmu", **TORQUE)
     with zipfile.ZipFile(path) as archive:
         original = archive.read("modelDescription.xml").decode()
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", original[:place] + text + original[place + length :])
-    try:
-        unit = sw.FMU(path, speed="u", torque="tau")
-    except sw.ParameterError as error:
-        assert "FMU" in str(error)
-    else:
-        assert len(unit.states) in (0, 1, 2)
+    with contextlib.suppress(sw.ParameterError):
+        assert len(sw.FMU(path, speed="u", torque="tau").states) <= 2

@@ -69,7 +69,7 @@ def _interface(title: str, code: CCode, outputs: Sequence[str] | None, t_end: fl
     states = {variable.name for variable in code.states}  # only asked for membership
     others = states | {variable.name for variable in (*code.inputs, *code.parameters)}
     wanted = tuple(variable.name for variable in code.outputs) if outputs is None else tuple(outputs)
-    token = hashlib.sha256("\0".join((code.header, code.source)).encode()).hexdigest()
+    token = hashlib.sha256(f"{code.header}\0{code.source}".encode()).hexdigest()
     return UnitInterface(
         title=title,
         identifier=code.name,
@@ -120,7 +120,9 @@ def _configuration(unit: UnitInterface, code: CCode) -> str:
         f'#define UNIT_TOKEN "{unit.token}"',
         *(f"#define UNIT_{name} {size}" for name, size in sizes.items()),
         _listed("UNIT_STORES_OF_STATES", stores, "of each state its place among the start values"),
-        _listed("UNIT_PLACES_OF_OUTPUTS", [places[v.name] for v in unit.outputs], "of each output among those of the model"),
+        _listed(
+            "UNIT_PLACES_OF_OUTPUTS", [places[v.name] for v in unit.outputs], "of each output among those of the model"
+        ),
         "",
     ]
     return "\n".join(lines)
@@ -150,7 +152,11 @@ def _binary(name: str, texts: Mapping[str, str], version: str) -> dict[str, byte
         sources = [file for file in texts if file.endswith(".c")]
         options = ["-std=c99", "-O2", "-shared", "-fPIC", "-fvisibility=hidden", "-s"]
         done = subprocess.run(  # noqa: S603 (the compiler of this machine, on code made here)
-            [compiler, *options, "-o", library, *sources, "-lm"], cwd=folder, capture_output=True, text=True, check=False
+            [compiler, *options, "-o", library, *sources, "-lm"],
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            check=False,
         )
         if done.returncode != 0:
             raise CompileError(f"The C compiler {compiler} failed on the code of '{name}': {done.stderr.strip()[:500]}")

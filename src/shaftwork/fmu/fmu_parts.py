@@ -102,6 +102,6 @@ def _refuse_wrong(part: Any, order: tuple[str, str]) -> None:
     reads, gives = (getattr(fmu, name) for name in order)
     if fmu.gives(reads) or not fmu.gives(gives):
         raise ParameterError(
-            f"{type(part).__name__} '{part.name}': of the FMU '{fmu.path.name}' {order[0]} = '{reads}' must be an input "
-            f"and {order[1]} = '{gives}' an output."
+            f"{type(part).__name__} '{part.name}': of the FMU '{fmu.path.name}' {order[0]} = '{reads}' must be an "
+            f"input and {order[1]} = '{gives}' an output."
         )

@@ -73,8 +73,8 @@ class FMU:
             ParameterError: always.
         """
         raise ParameterError(
-            "an FMU is a program that would run in this process, and no text in a file may ask for that. Build the part "
-            "in a script, with fmu=sw.FMU('file.fmu', speed=..., torque=...)"
+            "an FMU is a program that would run in this process, and no text in a file may ask for that. Build the "
+            "part in a script, with fmu=sw.FMU('file.fmu', speed=..., torque=...)"
         )
 
     @cached_property
@@ -112,13 +112,13 @@ class FMU:
             reason = f"is of FMI {unit.fmiVersion}; export it as FMI 2.0 or 3.0"
         elif unit.modelExchange is None:
             reason = (
-                "is for co-simulation alone: it keeps its states to itself, and a right-hand side cannot ask it. Export "
-                "it for model exchange, or step it beside a run of model.start(...)"
+                "is for co-simulation alone: it keeps its states to itself, and a right-hand side cannot ask it. "
+                "Export it for model exchange, or step it beside a run of model.start(...)"
             )
         elif events:
             reason = (
-                f"has {events} event indicators: it changes its equations by itself, which a part of a network may not. "
-                "Export it without events, or for co-simulation, and step it beside a run of model.start(...)"
+                f"has {events} event indicators: it changes its equations by itself, which a part of a network may "
+                "not. Export it without events, or for co-simulation, and step it beside a run of model.start(...)"
             )
         elif len(unit.derivatives) > MOST_STATES:
             reason = f"has {len(unit.derivatives)} states; at most {MOST_STATES} can be states of a network"

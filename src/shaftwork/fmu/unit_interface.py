@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-
 _BASE = {
     "kg": {"kg": 1},
     "m": {"m": 1},

@@ -12,8 +12,8 @@ from sympy.logic.boolalg import BooleanAtom, BooleanFunction
 
 from shaftwork.components.base import Component, Port, Profile, Signal
 from shaftwork.components.branches import ACROSS, HISTORY, INTEGRAL, THROUGH, End, named_in
-from shaftwork.components.laws import SYMBOLS, t
 from shaftwork.components.external import External, Handle
+from shaftwork.components.laws import SYMBOLS, t
 from shaftwork.components.modes import ANEW, Modes
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.components.tables import Interpolation, InterpolationSlope, Table
