@@ -75,6 +75,17 @@ def test_the_validator_finds_nothing(unit: Units, version: str) -> None:
     assert (int(mass_moment.kg), int(mass_moment.m), int(mass_moment.s or 0)) == (1, 2, 0)
 
 
+@pytest.mark.parametrize("version", VERSIONS)
+def test_the_description_says_what_depends_on_what(unit: Units, version: str) -> None:
+    description = fmpy.read_model_description(str(unit(version)))
+    unknowns = [*description.derivatives, *description.outputs]
+    read = {one.variable.name: {other.name for other in one.dependencies} for one in unknowns}
+    assert read["der(J1.omega)"] == {"J1.omega", "J2.omega", "shaft.tau_c", "motor.tau"}
+    assert read["der(shaft.tau_c)"] == {"J1.omega", "J2.omega"}
+    assert read["J2.omega"] == {"J2.omega"}
+    assert read["shaft.tau"] == {"J1.omega", "J2.omega", "shaft.tau_c"}
+
+
 def test_names_that_are_no_identifiers_are_flat(tmp_path: Path) -> None:
     net = sw.Network("Zahnräder & Wellen <1>")
     net.add(sw.TorqueSource("Motor 1", tau=1.0), "Welle 1")

@@ -15,7 +15,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from shaftwork.ccode.export import CCode, c_code
+from shaftwork.ccode.equation_set import EquationSet
+from shaftwork.ccode.export import RUNNING, CCode, c_code
 from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.core.files import in_a_folder
 from shaftwork.core.parameters import in_si
@@ -51,7 +52,8 @@ def export_unit(
     if kind not in _KINDS:
         raise ParameterError(f"kind = {kind!r} of an FMU is none of: {', '.join(map(repr, _KINDS))}.")
     code = c_code(model, name=None, inputs=inputs, outputs=outputs)
-    unit = _interface(model.name, code, outputs, in_si("t_end", t_end, "s", above=0))
+    end = in_si("t_end", t_end, "s", above=0)
+    unit = _interface(model.name, code, outputs, _dependencies(model, code), end)
     texts = _sources(unit, code, version)
     compiled = tuple(name for name in texts if name.endswith(".c"))
     members = {"modelDescription.xml": model_description(unit, version, _KINDS[kind], compiled)}
@@ -64,7 +66,29 @@ def export_unit(
     return place
 
 
-def _interface(title: str, code: CCode, outputs: Sequence[str] | None, t_end: float) -> UnitInterface:
+def _dependencies(model: Model, code: CCode) -> dict[str, tuple[str, ...]]:
+    """The states and inputs in each rate and output; of a network whose modes change them nothing is told."""
+    if model.phased:
+        return {}
+    inputs = dict.fromkeys((variable.name for variable in code.inputs), RUNNING)
+    equations = EquationSet(model.with_values(inputs) if inputs else model)
+    rates = {state.name: rate for state, rate in zip(equations.rows.states, equations.rows.rates, strict=True)}
+    laws = {f"der({name})": rate for name, rate in rates.items()}
+    laws |= {variable.name: equations.observables.quantity(variable.name) for variable in code.outputs}
+    moving = (*rates, *inputs)
+    read = {
+        name: {symbol.name for symbol in law.free_symbols} for name, law in laws.items()
+    }  # only asked for membership
+    return {name: tuple(other for other in moving if other in symbols) for name, symbols in read.items()}
+
+
+def _interface(
+    title: str,
+    code: CCode,
+    outputs: Sequence[str] | None,
+    dependencies: Mapping[str, tuple[str, ...]],
+    t_end: float,
+) -> UnitInterface:
     """What the unit shows: states that are outputs as well, and other outputs."""
     states = {variable.name for variable in code.states}  # only asked for membership
     others = states | {variable.name for variable in (*code.inputs, *code.parameters)}
@@ -80,7 +104,7 @@ def _interface(title: str, code: CCode, outputs: Sequence[str] | None, t_end: fl
         outputs=tuple(UnitVariable(v.name, v.unit) for v in code.outputs if v.name not in others),
         shown=frozenset(states & {*wanted}),
         indicators=code.guards,
-        dependencies={},
+        dependencies=dependencies,
         t_end=t_end,
     )
 
