@@ -50,11 +50,16 @@ class SetFunctions:
         self.places = [layout.states.index(state.name) for state in self.form.states]
         """Where its states are among those of all sets."""
 
+    @property
+    def _ties(self) -> bool:
+        """Whether inertias among the states carry others."""
+        return bool(self.form.dependent_across and self.form.across_states)
+
     @cached_property
     def text(self) -> str:
         """All functions."""
         parts = [self._rates(), self._jacobian(), self._outputs(), self._stores()]
-        parts += [self.mass()] if self.form.dependent_across else []
+        parts += [self.mass()] if self._ties else []
         parts += [self._take_up()]
         return "\n".join(parts)
 
@@ -120,7 +125,7 @@ class SetFunctions:
             "stores", "const double *restrict x, double *restrict stored", [*self.assigned(targets, expressions)]
         )
 
-    def mass(self) -> str:
+    def mass(self, name: str = "mass") -> str:
         """C + Q K F': the inertias of the states with all that turns with them, an array (n, n) of zeros before."""
         form, n = self.form, len(self.form.across_states)
         entries = {(k, k): form.law_of(branch) for k, branch in enumerate(form.across_states)}
@@ -131,7 +136,7 @@ class SetFunctions:
                 entries[at] = entries.get(at, Integer(0)) + share * form.law_of(link) * gain
         targets = [f"mass[{row * n + column}]" for row, column in entries]
         return self.written(
-            "mass", "const double *restrict x, double *restrict mass", [*self.assigned(targets, [*entries.values()])]
+            name, "const double *restrict x, double *restrict mass", [*self.assigned(targets, [*entries.values()])]
         )
 
     def _row(self, rows: Mapping[int, Row], link: int) -> list[tuple[int, Expr]]:
@@ -142,9 +147,9 @@ class SetFunctions:
     def _take_up(self) -> str:
         """The states that take up what was stored with the least change: see `codegen.state_transfer`."""
         form = self.form
-        lines = [*self._speeds_taken_up()] if form.dependent_across else []
+        lines = [*self._speeds_taken_up()] if self._ties else []
         lines += self._torques_taken_up() if form.dependent_through else []
-        tied = {"across": form.dependent_across, "through": form.dependent_through, "integral": ()}
+        tied = {"across": self._ties, "through": form.dependent_through, "integral": ()}
         free = [(place, state) for place, state in zip(self.places, form.states, strict=True) if not tied[state.kind]]
         lines += self.assigned([f"x[{place}]" for place, _ in free], [stored_symbol(state.name) for _, state in free])
         return self.written("take_up", "const double *restrict stored, double *restrict x", lines)
@@ -161,7 +166,7 @@ class SetFunctions:
                 right[tree] += share * form.law_of(link) * (self._stored(link) - prescribed)
         yield f"double mass[{n * n}] = {{0.0}}, right[{n}];"
         yield f"mass_{self.number}(m, t, stored, mass);"
-        yield from self.assigned([f"right[{k}]" for k in range(n)], [*right.values()])
+        yield from self._block([f"right[{k}]" for k in range(n)], [*right.values()])
         yield f"solve({n}, mass, 1, right);"
         yield from (f"x[{place}] = right[{k}];" for k, place in enumerate(self.places[form.speeds]))
 
@@ -183,10 +188,16 @@ class SetFunctions:
                         at = number[link], number[other]
                         entries[at] = entries.get(at, Integer(0)) + gain * share / form.law_of(tree)
         yield f"double slack[{n * n}] = {{0.0}}, twist[{n}];"
-        yield from self.assigned([f"slack[{row * n + column}]" for row, column in entries], [*entries.values()])
-        yield from self.assigned([f"twist[{k}]" for k in range(n)], [*right.values()])
+        yield from self._block([f"slack[{row * n + column}]" for row, column in entries], [*entries.values()])
+        yield from self._block([f"twist[{k}]" for k in range(n)], [*right.values()])
         yield f"solve({n}, slack, 1, twist);"
         yield from (f"x[{place}] = twist[{k}];" for k, place in enumerate(self.places[form.torques]))
+
+    def _block(self, targets: Sequence[str], expressions: Sequence[Expr]) -> Iterator[str]:
+        """Assignments with names of their own."""
+        yield "{"
+        yield from (f"    {line}" for line in self.assigned(targets, expressions))
+        yield "}"
 
     def _given(self, link: int) -> Expr:
         """What a source gives by the time alone; what follows from the states gives nothing at once."""

@@ -172,7 +172,15 @@ class Writer:
                 *map(runtime, helpers),
                 text,
                 runtime("dop853.c"),
-                *map(runtime, ("solver.c", "jumps.c", "events.c" if modes else "smooth.c", "common.c")),
+                *map(
+                    runtime,
+                    (
+                        "solver.c",
+                        "jumps.c",
+                        *(("events.c", "impacts.c", "iteration.c") if modes else ("smooth.c",)),
+                        "common.c",
+                    ),
+                ),
                 *(modes.names if modes else [_NO_MODES]),
                 self._init,
             ]
