@@ -34,7 +34,7 @@ BY_TURNS = {"HarmonicTorque"}
 """Their law counts the turns of their own shaft, and whole orders of one are none of another."""
 ALONG_A_LINE = {"Rope"}
 """There is no such part that turns."""
-BUILT_IN = {name: kind for name, kind in REGISTRY.items() if kind.__module__.startswith("shaftwork.")}
+BUILT_IN = {name: kind for name, kind in REGISTRY.items() if kind.__module__.startswith("shaftwork.components.")}
 
 
 def seen(kind: type[sw.Component], scale: Scale, domain: Domain = ROTATION) -> Any:
