@@ -55,6 +55,11 @@ class SetFunctions:
         """Whether inertias among the states carry others."""
         return bool(self.form.dependent_across and self.form.across_states)
 
+    @property
+    def _slack(self) -> bool:
+        """Whether springs among the states carry others."""
+        return bool(self.form.dependent_through and self.form.through_states)
+
     @cached_property
     def text(self) -> str:
         """All functions."""
@@ -148,8 +153,8 @@ class SetFunctions:
         """The states that take up what was stored with the least change: see `codegen.state_transfer`."""
         form = self.form
         lines = [*self._speeds_taken_up()] if self._ties else []
-        lines += self._torques_taken_up() if form.dependent_through else []
-        tied = {"across": self._ties, "through": form.dependent_through, "integral": ()}
+        lines += self._torques_taken_up() if self._slack else []
+        tied = {"across": self._ties, "through": self._slack, "integral": ()}
         free = [(place, state) for place, state in zip(self.places, form.states, strict=True) if not tied[state.kind]]
         lines += self.assigned([f"x[{place}]" for place, _ in free], [stored_symbol(state.name) for _, state in free])
         return self.written("take_up", "const double *restrict stored, double *restrict x", lines)

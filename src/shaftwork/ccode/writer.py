@@ -162,7 +162,9 @@ class Writer:
             for axis, points in (("X", table.xs), ("Y", table.ys))
         ]
         helpers = (
-            ["numbers.c"] * ("solve(" in text) + ["tables.c"] * bool(tables) + ["noise.c"] * ("held_noise(" in text)
+            ["numbers.c"] * (modes is not None or "solve(" in text)
+            + ["tables.c"] * bool(tables)
+            + ["noise.c"] * ("held_noise(" in text)
         )
         return "\n".join(
             [
@@ -210,7 +212,8 @@ class Writer:
 _INIT = """void NAME_init(NAME *m)
 {
     memset(m, 0, sizeof *m);
-    m->look_ahead = 1e-6;"""
+    m->look_ahead = 1e-6;
+    m->most_steps = 1000000;"""
 _NO_GUARDS = """static void guards(const NAME *m, double t, const double *x, double *g)
 {
     (void)m;
