@@ -1,4 +1,4 @@
-"""The functions of one set of equations in C: rates, slopes, outputs, what is stored, and states from what was stored."""
+"""The functions of one set of equations in C: rates, slopes, outputs, what is stored, states from it."""
 
 from __future__ import annotations
 
@@ -72,9 +72,9 @@ class SetFunctions:
         """A function of this set: its name ends with the number of the set."""
         return function(f"void {name}_{self.number}(const NAME *m, double t, {arguments})", [*lines])
 
-    def assigned(self, targets: Sequence[str], expressions: Sequence[Expr], add: bool = False) -> Iterator[str]:
+    def assigned(self, targets: Sequence[str], expressions: Sequence[Expr]) -> Iterator[str]:
         """Lines that assign expressions to targets."""
-        return self.layout.statements.assigned(targets, expressions, add)
+        return self.layout.statements.assigned(targets, expressions)
 
     def _rates(self) -> str:
         expressions = list(self.rows.rates)
