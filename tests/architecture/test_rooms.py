@@ -24,6 +24,7 @@ USES = {
     "sizing": "sw.sizing.duty",
     "drawing": "net.draw()",
     "analogues": "net.circuit().simulate(0.1)",
+    "ccode": "net.compile().to_c(folder)",
     "studies": "sw.studies.work_precision",
     "animation": "net.simulate(0.1).animate()",
     "spectra": "net.simulate(0.1).spectrum('shaft.tau')",
@@ -48,7 +49,12 @@ JOINS = {
     "modelfiles": ("shaftwork.reporting", "shaftwork.live"),
     "reporting": ("shaftwork.live",),
     "frequency": ("shaftwork.live", "shaftwork.torsional.forced_train"),
-    "hybrid": ("shaftwork.waves.hybrid_wave_model", "shaftwork.waves.hybrid_waves", "shaftwork.sweep.hybrid_ensemble"),
+    "hybrid": (
+        "shaftwork.ccode.mode_tables",
+        "shaftwork.waves.hybrid_wave_model",
+        "shaftwork.waves.hybrid_waves",
+        "shaftwork.sweep.hybrid_ensemble",
+    ),
     "latex": (
         "shaftwork.lagrange.lagrange_print",
         "shaftwork.reduce.reduction_print",

@@ -103,6 +103,7 @@ def _struct(code: CCode) -> type[ctypes.Structure]:
             ("clear", real * (code.guards + 1)),
             ("met", whole),
             *((name, real) for name in ("next", "since", "until", "h", "look_ahead")),
+            ("most_steps", ctypes.c_long),
             ("fault", whole),
             *((name, ctypes.c_long) for name in ("steps", "rejected", "events")),
         )

@@ -40,8 +40,8 @@ class EquationSet:
             return explicit_rows(self.form)
         except BlockTooLargeError:
             raise CompileError(
-                f"'{self.form.graph.name}' has no equations line by line: more than three speeds or torques are coupled "
-                "rigidly. Put a spring between some of the gears, or simulate it here."
+                f"'{self.form.graph.name}' has no equations line by line: more than three speeds or torques are "
+                "coupled rigidly. Put a spring between some of the gears, or simulate it here."
             ) from None
 
     @cached_property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,10 +16,43 @@ from shaftwork.core.files import replaced
 from shaftwork.network.netlist import listed
 from shaftwork.pipeline.model import Model
 
-RESERVED = (
-    "auto break case char const continue default do double else enum extern float for goto if inline int long main "
-    "register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while"
-).split()
+RESERVED = [
+    "auto",
+    "break",
+    "case",
+    "char",
+    "const",
+    "continue",
+    "default",
+    "do",
+    "double",
+    "else",
+    "enum",
+    "extern",
+    "float",
+    "for",
+    "goto",
+    "if",
+    "inline",
+    "int",
+    "long",
+    "main",
+    "register",
+    "restrict",
+    "return",
+    "short",
+    "signed",
+    "sizeof",
+    "static",
+    "struct",
+    "switch",
+    "typedef",
+    "union",
+    "unsigned",
+    "void",
+    "volatile",
+    "while",
+]
 """Words that no name in C can be."""
 LONGEST = 40
 """Signs of a name: 63 of a function's name count in C99, and what it does stands behind the name."""
@@ -147,7 +180,8 @@ def _input_values(model: Model, inputs: Sequence[str]) -> dict[str, float]:
     for name in inputs:
         if name not in laws:
             raise ParameterError(
-                f"inputs: '{name}' is no parameter that may vary with the time. There are: {listed(laws, 12) or 'none'}."
+                f"inputs: '{name}' is no parameter that may vary with the time. "
+                f"There are: {listed(laws, 12) or 'none'}."
             )
         owner, _, key = name.rpartition(".")
         law = as_expression(getattr(parts[owner], key) or 0.0).subs(TIME, 0)

@@ -98,7 +98,8 @@ static double next_level(double slope, double offset, int n, const double *level
     if (slope == 0.0) return INFINITY;
     while (low < high) {
         const int middle = low + (high - low) / 2;
-        if (slope > 0.0 ? (levels[middle] - offset) / slope <= t : (levels[middle] - offset) / slope > t) low = middle + 1;
+        const double time = (levels[middle] - offset) / slope;
+        if (slope > 0.0 ? time <= t : time > t) low = middle + 1;
         else high = middle;
     }
     if (slope > 0.0) return low < n ? (levels[low] - offset) / slope : INFINITY;

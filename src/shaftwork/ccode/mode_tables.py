@@ -12,6 +12,7 @@ from sympy import Expr, Integer, Piecewise
 from shaftwork.ccode.equation_set import EquationSet
 from shaftwork.ccode.printing import Statements, array, function, text_of
 from shaftwork.ccode.set_functions import SetFunctions
+from shaftwork.ccode.texts import dispatcher, runtime
 from shaftwork.codegen.state_transfer import WITHOUT_INERTIA, StateTransfer
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH
 from shaftwork.components.laws import t as TIME
@@ -56,8 +57,8 @@ class ModeTables:
         if self._model.form.loses_power:
             parts = [part.name for part in self._model.form.graph.parts for m in part.modes if m.passes_on]
             raise CompileError(
-                f"{listed(parts)} of '{title}' loses power by the direction of its torque, of which there is no C code. "
-                "Take efficiency=1 and a damper."
+                f"{listed(parts)} of '{title}' loses power by the direction of its torque, of which there is no C "
+                "code. Take efficiency=1 and a damper."
             )
 
     @cached_property
@@ -128,8 +129,6 @@ class ModeTables:
 
     def texts(self, functions: Sequence[SetFunctions], statements: Statements) -> list[str]:
         """The functions and tables of all sets."""
-        from shaftwork.ccode.writer import dispatcher, runtime
-
         x = "const double *restrict x"
         texts = [runtime("modes.c"), *self._tables()]
         for one, guards in zip(functions, self._guards, strict=True):
@@ -216,7 +215,8 @@ class ModeTables:
         bends = any(one.rows.across[k].has(TIME) for one in self.sets for k in one.form.across_sources)
         together = self._model.netlist.impacts == "together"
         torques = [name in StateTransfer(self.sets[0].form).through for name in StateTransfer(self.sets[0].form).names]
-        yield f"enum {{ SWITCHES = {switching:d}, BENDS = {bends:d}, TOGETHER = {together:d}, HAS_TORQUES = {any(torques):d} }};"
+        yield f"enum {{ SWITCHES = {switching:d}, BENDS = {bends:d} }};"
+        yield f"enum {{ TOGETHER = {together:d}, HAS_TORQUES = {any(torques):d} }};"
         yield _integers("MODES", [len(modes) for modes in options])
         yield _integers("FORM_STRIDE", strides)
         yield _integers("SET_OF", sets)
@@ -298,14 +298,18 @@ class ModeTables:
     @property
     def names(self) -> list[str]:
         """The function that names modes."""
-        cells = [text_of(mode.words) for machine in self._machines for mode in machine.modes.options for _ in (0,)]
-        firsts = [sum(len(machine.modes.options) for machine in self._machines[:k]) for k in range(len(self._machines))]
-        lines = "\n".join(f"        {cell}," for cell in cells)
-        return [
-            _integers("FIRST_NAME", firsts),
-            f"const char *NAME_mode_name(int machine, int mode)\n{{\n    static const char *const NAMES[] = {{\n{lines}\n    }};\n"
-            '    return machine >= 0 && machine < NM && mode >= 0 && mode < MODES[machine] ? NAMES[FIRST_NAME[machine] + mode] : "";\n}\n',
-        ]
+        options = [machine.modes.options for machine in self._machines]
+        firsts = [sum(map(len, options[:k])) for k in range(len(options))]
+        words = [text_of(mode.words) for modes in options for mode in modes]
+        return [_integers("FIRST_NAME", firsts), array("const char *const", "MODE_NAMES", words), _MODE_NAME]
+
+
+_MODE_NAME = """const char *NAME_mode_name(int machine, int mode)
+{
+    const int told = machine >= 0 && machine < NM && mode >= 0 && mode < MODES[machine];
+    return told ? MODE_NAMES[FIRST_NAME[machine] + mode] : "";
+}
+"""
 
 
 def _integers(name: str, values: Sequence[int]) -> str:

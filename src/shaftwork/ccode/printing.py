@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from sympy import Basic, Expr, Mod, Piecewise, Pow, Symbol
+from sympy import Basic, Expr, Mod, Piecewise, Pow, Symbol, true
 from sympy.printing.codeprinter import PrintMethodNotImplementedError
 
 from shaftwork.codegen.code import shared_parts
@@ -56,11 +56,8 @@ class TablePrinter(CPrinter):
     def _print_Piecewise(self, pieces: Piecewise) -> str:
         text = "NAN"
         for value, condition in reversed(pieces.args):
-            text = (
-                self._print(value)
-                if condition == True
-                else f"({self._print(condition)} ? {self._print(value)} : {text})"
-            )  # noqa: E712
+            code = self._print(value)
+            text = code if condition is true else f"({self._print(condition)} ? {code} : {text})"
         return f"({text})"
 
 
@@ -76,7 +73,7 @@ class Statements:
         self._names, self._title = names, title
         self.tables: dict[Table, int] = {}
 
-    def assigned(self, targets: Sequence[str], expressions: Sequence[Expr], add: bool = False) -> Iterator[str]:
+    def assigned(self, targets: Sequence[str], expressions: Sequence[Expr]) -> Iterator[str]:
         """The lines that assign expressions to targets.
 
         Raises:
@@ -88,7 +85,7 @@ class Statements:
             for name, code in shared_parts(printer, plain).items():
                 yield f"const double {name} = {code};"
             for target, expression in zip(targets, plain, strict=True):
-                yield f"{target} {'+=' if add else '='} {printer.doprint(expression)};"
+                yield f"{target} = {printer.doprint(expression)};"
         except PrintMethodNotImplementedError as error:
             raise CompileError(
                 f"'{self._title}' has a law that C has no function for: {error}. Write it with others, or as a Table."

@@ -1,4 +1,4 @@
-"""The functions of one set of equations in C: rates, slopes, outputs, what is stored, and states from what was stored."""
+"""The functions of one set of equations in C: rates, slopes, outputs, what is stored, states from it."""
 
 from __future__ import annotations
 
@@ -55,6 +55,11 @@ class SetFunctions:
         """Whether inertias among the states carry others."""
         return bool(self.form.dependent_across and self.form.across_states)
 
+    @property
+    def _slack(self) -> bool:
+        """Whether springs among the states carry others."""
+        return bool(self.form.dependent_through and self.form.through_states)
+
     @cached_property
     def text(self) -> str:
         """All functions."""
@@ -67,9 +72,9 @@ class SetFunctions:
         """A function of this set: its name ends with the number of the set."""
         return function(f"void {name}_{self.number}(const NAME *m, double t, {arguments})", [*lines])
 
-    def assigned(self, targets: Sequence[str], expressions: Sequence[Expr], add: bool = False) -> Iterator[str]:
+    def assigned(self, targets: Sequence[str], expressions: Sequence[Expr]) -> Iterator[str]:
         """Lines that assign expressions to targets."""
-        return self.layout.statements.assigned(targets, expressions, add)
+        return self.layout.statements.assigned(targets, expressions)
 
     def _rates(self) -> str:
         expressions = list(self.rows.rates)
@@ -148,8 +153,8 @@ class SetFunctions:
         """The states that take up what was stored with the least change: see `codegen.state_transfer`."""
         form = self.form
         lines = [*self._speeds_taken_up()] if self._ties else []
-        lines += self._torques_taken_up() if form.dependent_through else []
-        tied = {"across": self._ties, "through": form.dependent_through, "integral": ()}
+        lines += self._torques_taken_up() if self._slack else []
+        tied = {"across": self._ties, "through": self._slack, "integral": ()}
         free = [(place, state) for place, state in zip(self.places, form.states, strict=True) if not tied[state.kind]]
         lines += self.assigned([f"x[{place}]" for place, _ in free], [stored_symbol(state.name) for _, state in free])
         return self.written("take_up", "const double *restrict stored, double *restrict x", lines)

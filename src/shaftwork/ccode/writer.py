@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
-from importlib.resources import files
 from typing import TYPE_CHECKING, NamedTuple
 
 from sympy import Symbol
 
 from shaftwork.ccode.equation_set import EquationSet
 from shaftwork.ccode.instants import Instants
-from shaftwork.ccode.printing import Statements, array, function, text_of
+from shaftwork.ccode.printing import Statements, array
 from shaftwork.ccode.set_functions import Layout, SetFunctions, stored_symbol
+from shaftwork.ccode.texts import dispatcher, filled, names_of, runtime
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.laws import t as TIME
-from shaftwork.core.errors import CompileError, SignalError
+from shaftwork.core.errors import SignalError
 from shaftwork.formulation.form import Names
 from shaftwork.network.netlist import listed
 from shaftwork.pipeline.model import Model
@@ -162,7 +161,9 @@ class Writer:
             for axis, points in (("X", table.xs), ("Y", table.ys))
         ]
         helpers = (
-            ["numbers.c"] * ("solve(" in text) + ["tables.c"] * bool(tables) + ["noise.c"] * ("held_noise(" in text)
+            ["numbers.c"] * (modes is not None or "solve(" in text)
+            + ["tables.c"] * bool(tables)
+            + ["noise.c"] * ("held_noise(" in text)
         )
         return "\n".join(
             [
@@ -210,7 +211,8 @@ class Writer:
 _INIT = """void NAME_init(NAME *m)
 {
     memset(m, 0, sizeof *m);
-    m->look_ahead = 1e-6;"""
+    m->look_ahead = 1e-6;
+    m->most_steps = 1000000;"""
 _NO_GUARDS = """static void guards(const NAME *m, double t, const double *x, double *g)
 {
     (void)m;
@@ -226,31 +228,3 @@ _NO_MODES = """const char *NAME_mode_name(int machine, int mode)
     return "";
 }
 """
-
-
-def dispatcher(name: str, arguments: Sequence[str], count: int) -> str:
-    """The function that calls that of the set of equations of an instance."""
-    call = ", ".join(("m", "t", *(argument.split("*restrict ")[-1] for argument in arguments)))
-    if count == 1:
-        lines = [f"{name}_0({call});"]
-    else:
-        cases = (f"case {k}: {name}_{k}({call}); break;" for k in range(1, count))
-        lines = ["switch (m->set) {", *cases, f"default: {name}_0({call}); break;", "}"]
-    return function(f"void {name}(const NAME *m, double t, {', '.join(arguments)})", lines)
-
-
-def names_of(kind: str, what: str, texts: Sequence[str]) -> str:
-    """A public list of names or units."""
-    lines = "\n".join(f"    {text_of(text)}," for text in (*texts, ""))
-    return f"const char *const NAME_{kind}_{what}[NAME_{kind.upper()}S + 1] = {{\n{lines}\n}};"
-
-
-def runtime(file: str) -> str:
-    """C code that is the same for all models."""
-    return files(__package__ or "").joinpath("runtime", file).read_text(encoding="utf-8")
-
-
-def filled(text: str, name: str, places: Mapping[str, object]) -> str:
-    """C code with the name of the model and the sizes of its arrays."""
-    text = re.sub(r"@(\w+)@", lambda match: str(places[match[1]]), text)
-    return re.sub(r"\bNAME(?=\b|_)", name, re.sub(r"\bNAME_H\b", f"{name.upper()}_H", text))

@@ -175,6 +175,7 @@ def _binary(name: str, texts: Mapping[str, str], version: str) -> dict[str, byte
             (Path(folder) / file).write_text(text, encoding="utf-8")
         sources = [file for file in texts if file.endswith(".c")]
         options = ["-std=c99", "-O2", "-shared", "-fPIC", "-fvisibility=hidden", "-s"]
+        options.append("-Werror=implicit-function-declaration")  # else what is missing shows where the unit is loaded
         done = subprocess.run(  # noqa: S603 (the compiler of this machine, on code made here)
             [compiler, *options, "-o", library, *sources, "-lm"],
             cwd=folder,

@@ -144,7 +144,7 @@ static void bands_of(const NAME *m, double *bands)
 static int leaving(const NAME *m, const int *list, int count, int again, Excess *beyond)
 {
     double x[4][NX], dx[4][NX], g[4][NG];
-    int open[MOST_WATCHED], n_open = count, found = 0;
+    int open[MOST_WATCHED] = {0}, n_open = count, found = 0;
     double t = m->t;
     for (int i = 0; i < NX; i++) x[0][i] = m->x[i];
     course(m, t, x[0], dx[0], g[0]);
@@ -181,8 +181,8 @@ static int exceeded(NAME *m, const NAME *before, const double *before_bands, con
                     int again, Excess *out)
 {
     double bands[NG], g[NG];
-    int list[MOST_WATCHED], on_limit[MOST_WATCHED], n_on = 0, n_beyond = 0, hits = 0;
-    Excess beyond[2 * MOST_WATCHED], soon[MOST_WATCHED];
+    int list[MOST_WATCHED] = {0}, on_limit[MOST_WATCHED] = {0}, n_on = 0, n_beyond = 0, hits = 0;
+    Excess beyond[2 * MOST_WATCHED] = {{0.0, 0}}, soon[MOST_WATCHED] = {{0.0, 0}};
     const int count = watched(m, list), same = before->set == m->set;
     bands_of(m, bands);
     guards(m, inside(m, m->t), m->x, g);
@@ -202,7 +202,7 @@ static int exceeded(NAME *m, const NAME *before, const double *before_bands, con
     for (int n = 0; n < n_beyond; n++)
         if (!(LEAVES[WATCHES[beyond[n].watch].leave].how & BY_TORQUE)) out[hits++] = beyond[n];
     if (hits) return hits;
-    int timed[MOST_WATCHED], n_timed = 0;
+    int timed[MOST_WATCHED] = {0}, n_timed = 0;
     for (int n = 0; n < n_on; n++)
         if (LEAVES[WATCHES[on_limit[n]].leave].how & BY_TIME) timed[n_timed++] = on_limit[n];
     if (n_timed && (hits = leaving(m, timed, n_timed, 0, out)) > 0) return hits;
@@ -284,7 +284,7 @@ static int keeping(NAME *m, const int *mode, const int *leaves, int n, int least
     for (int size = least; size <= n; size++)
         for (unsigned mask = 0; mask < 1u << n && tried < 500; mask++) {
             int bits = 0, chosen[NM];
-            Excess found[2 * MOST_WATCHED];
+            Excess found[2 * MOST_WATCHED] = {{0.0, 0}};
             for (int k = 0; k < n; k++) bits += (int)(mask >> k & 1u);
             if (bits != size) continue;
             tried++;
@@ -307,7 +307,7 @@ static int keeping(NAME *m, const int *mode, const int *leaves, int n, int least
 /* Machines pass to other modes, and diodes and freewheels to those in which they take over what is cut off. */
 static int commutated(NAME *m, const int *mode)
 {
-    int leaves[NM];
+    int leaves[NM] = {0};
     NAME plain = *m;
     if (!to_modes(&plain, mode)) return 0;
     if (plain.set != m->set && HAS_TORQUES && !keeps(m, &plain, 1))
@@ -319,7 +319,7 @@ static int commutated(NAME *m, const int *mode)
 /* A switch changes, with all others whose time it is too, and diodes so that all that is stored goes on; else 0. */
 static int switched(NAME *m, int machine, int to, const double *bands)
 {
-    int mode[NM], opens[NM], list[MOST_WATCHED], leaves[2 * NM], changes = 1, n_opens = 0;
+    int mode[NM], opens[NM], list[MOST_WATCHED], leaves[2 * NM] = {0}, changes = 1, n_opens = 0;
     double g[NG];
     guards(m, inside(m, m->t), m->x, g);
     for (int k = 0; k < NM; k++) mode[k] = m->mode[k];

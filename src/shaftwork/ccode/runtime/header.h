@@ -38,7 +38,8 @@ enum {
     NAME_STEP_TOO_SMALL = -1,
     NAME_TOO_MANY_EVENTS = -2,
     NAME_NO_CONSISTENT_MODES = -3,
-    NAME_GAINS_ENERGY = -4
+    NAME_GAINS_ENERGY = -4,
+    NAME_TOO_MANY_STEPS = -5
 };
 
 typedef struct NAME {
@@ -56,6 +57,7 @@ typedef struct NAME {
     double next, since, until;           /* the next instant of laws of time; between which times they are read */
     double h;                            /* next step size, s; 0 where it has to be found */
     double look_ahead;                   /* how far at most an event looks ahead, s */
+    long most_steps;                     /* of one call of NAME_integrate */
     int fault;                           /* 0, or the code of the last fault */
     long steps, rejected, events;        /* what NAME_integrate has done */
 } NAME;

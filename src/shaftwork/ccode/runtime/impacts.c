@@ -287,7 +287,7 @@ static int closed_at_end(NAME *m, const int *before, const Contact *c, int n, do
 /* What follows where sources jump or something jams: what is closed takes it up or opens. */
 static int pulled(NAME *m, double least, int sources_jump)
 {
-    Contact c[MOST_CONTACTS];
+    Contact c[MOST_CONTACTS] = {{0, 0, 0, 0, 0.0, 0.0, 0.0}};
     double back[MOST_CONTACTS] = {0.0}, pressed[MOST_CONTACTS];
     int hit[MOST_CONTACTS], stays[MOST_CONTACTS], before[NM];
     const int n = lasting(m, c);
@@ -304,7 +304,7 @@ static int pulled(NAME *m, double least, int sources_jump)
 /* The impact of a machine that closes by a leave. 0 where modes contradict; thrown says whether it comes back. */
 static int impact(NAME *m, int leave, int may_rebound, int *thrown)
 {
-    Contact c[MOST_CONTACTS];
+    Contact c[MOST_CONTACTS] = {{0, 0, 0, 0, 0.0, 0.0, 0.0}};
     double opens[MOST_CONTACTS], back[MOST_CONTACTS], pressed[MOST_CONTACTS], fastest = 0.0, largest = 0.0;
     int hit[MOST_CONTACTS], stays[MOST_CONTACTS], before[NM], wanted = -1;
     int n = touching(m, leave, c);
@@ -357,7 +357,7 @@ static int impact(NAME *m, int leave, int may_rebound, int *thrown)
 /* Of what is hit at an instant the leave of what closes fastest. */
 static int fastest_leave(const NAME *m, int leave)
 {
-    Contact c[MOST_CONTACTS];
+    Contact c[MOST_CONTACTS] = {{0, 0, 0, 0, 0.0, 0.0, 0.0}};
     double opens[MOST_CONTACTS];
     int first = -1, n = touching(m, leave, c);
     if (!TOGETHER) n = in_turn(m, c, n);

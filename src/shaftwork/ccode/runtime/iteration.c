@@ -67,7 +67,7 @@ static int in_seen(int seen[MOST_SEEN][NM], int count, const int *mode)
 
 static int worst_of(NAME *m, const NAME *before, const double *bands, const int *idle, int n_idle, int repeats)
 {
-    Excess found[2 * MOST_WATCHED];
+    Excess found[2 * MOST_WATCHED] = {{0.0, 0}};
     const int in_order = repeats > 0, n = exceeded(m, before, bands, idle, n_idle, in_order, in_order, found);
     int first = 0;
     if (!n) return -1;
@@ -118,14 +118,14 @@ static int consistent(NAME *m, int worst)
 static int iterate(NAME *m)
 {
     double g[NG];
-    int list[MOST_WATCHED], first[MOST_WATCHED], n_first = 0, named = -1, twists = 0, best = 0;
+    int list[MOST_WATCHED] = {0}, first[MOST_WATCHED] = {0}, n_first = 0, named = -1, twists = 0, best = 0;
     const int count = watched(m, list), met = m->met;
     m->met = -1;
     for (int n = 0; n < count; n++)
         if (WATCHES[list[n]].guard == met) named = list[n];
     if (named < 0) return consistent(m, -1);
     NAME look = *m;
-    Excess found[2 * MOST_WATCHED];
+    Excess found[2 * MOST_WATCHED] = {{0.0, 0}};
     const int n_found = exceeded(&look, m, m->clear, list, 0, 1, 0, found);
     int all_by_torque = 1, has_named = 0;
     for (int k = 0; k < n_found; k++) {

@@ -214,7 +214,8 @@ int NAME_integrate(NAME *m, double t_end, double rtol)
 {
     double k[16][NX], z[NX];
     int fresh = 1, rejected = 0;
-    while (m->t < t_end) {
+    for (long step = 0; m->t < t_end; step++) {
+        if (step > m->most_steps) return m->fault = NAME_TOO_MANY_STEPS;
         const double stop = fmin(t_end, m->next), left = stop - m->t;
         if (fresh) NAME_rhs(m, m->t, m->x, k[0]);
         fresh = 0;
