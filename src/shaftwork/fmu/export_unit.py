@@ -51,7 +51,7 @@ def export_unit(
         raise ParameterError(f"version = {version!r} of FMI is none of: {', '.join(VERSIONS)}.")
     if kind not in _KINDS:
         raise ParameterError(f"kind = {kind!r} of an FMU is none of: {', '.join(map(repr, _KINDS))}.")
-    code = c_code(model, name=None, inputs=inputs, outputs=outputs)
+    code = _code(model, inputs, outputs)
     end = in_si("t_end", t_end, "s", above=0)
     unit = _interface(model.name, code, outputs, _dependencies(model, code), end)
     texts = _sources(unit, code, version)
@@ -64,6 +64,19 @@ def export_unit(
         members |= _binary(code.name, texts, version)
     _write(place, members)
     return place
+
+
+def _code(model: Model, inputs: Sequence[str], outputs: Sequence[str] | None) -> CCode:
+    """The C code; states are read in any case, and what is stored and no state in any mode is an output like others."""
+    if outputs is None:
+        return c_code(model, inputs=inputs)
+    if isinstance(outputs, str):
+        raise ParameterError(f"outputs = {outputs!r} must be a list of names, such as [{outputs!r}].")
+    code = c_code(model, inputs=inputs, outputs=[name for name in outputs if name not in model.states])
+    states = {variable.name for variable in code.states}  # only asked for membership
+    if states >= {name for name in outputs if name in model.states}:
+        return code
+    return c_code(model, inputs=inputs, outputs=[name for name in outputs if name not in states])
 
 
 def _dependencies(model: Model, code: CCode) -> dict[str, tuple[str, ...]]:
