@@ -173,7 +173,9 @@ def _input_values(model: Model, inputs: Sequence[str]) -> dict[str, float]:
         ParameterError: it is no parameter that may vary with the time.
     """
     parts = {part.name: part.component for part in model.form.graph.parts}
-    laws = [f"{name}.{key}" for name, part in parts.items() for key, item in part.declared.items() if item.law]
+    # the momentum of an inertia that changes would need the rate of its change
+    pairs = ((name, part) for name, part in parts.items() if part.role != "store")
+    laws = [f"{name}.{key}" for name, part in pairs for key, item in part.declared.items() if item.law]
     if isinstance(inputs, str):
         raise ParameterError(f"inputs = {inputs!r} must be a list of names, such as [{inputs!r}].")
     values: dict[str, float] = {}
