@@ -150,6 +150,18 @@ def test_parameters_and_start_values_can_be_set(unit: Units, version: str, kind:
     np.testing.assert_allclose(seen["J2.omega"], motion["J2.omega"], atol=1e-6)
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_network_without_states_has_outputs_that_jump(kind: str, tmp_path: Path) -> None:
+    net = sw.Network("prescribed")
+    net.add(sw.SpeedSource("drive", omega=sw.Step(2.0, 0.25, before=1.0)), "shaft")
+    net.add(sw.Damper("load", d=0.5), "shaft")
+    net.compile().to_fmu(tmp_path / "unit.fmu", outputs=["load.tau"])
+    seen = fmpy.simulate_fmu(
+        str(tmp_path / "unit.fmu"), fmi_type=kind, stop_time=0.5, output_interval=0.1, record_events=False
+    )
+    np.testing.assert_allclose(seen["load.tau"], [0.5, 0.5, 0.5, 1.5, 1.5, 1.5], rtol=1e-12)
+
+
 @pytest.mark.parametrize("version", VERSIONS)
 def test_a_restored_state_goes_on_to_the_same_bits(unit: Units, version: str) -> None:
     names = ("J1.omega", "J2.omega", "shaft.tau")

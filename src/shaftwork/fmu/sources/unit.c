@@ -321,6 +321,21 @@ int unit_update(Unit *unit, bool *changed, bool *next_defined, double *next)
     return checked(unit, what);
 }
 
+/* On to a time with all events; where there are no states nothing is integrated, and laws of time jump. */
+static int advance(Model *model, double end, double tolerance)
+{
+    int what = 0;
+    if (UNIT_STATES > 0) {
+        return MODEL(integrate)(model, end, tolerance);
+    }
+    while (model->next <= end && what >= 0) {
+        model->t = model->next;
+        what = event(model);
+    }
+    model->t = end;
+    return what;
+}
+
 int unit_step(Unit *unit, double t, double size)
 {
     Model *model = &unit->state.model;
@@ -335,7 +350,7 @@ int unit_step(Unit *unit, double t, double size)
         return 1;
     }
     unit->state.changed = false;
-    return checked(unit, MODEL(integrate)(model, end, unit->state.tolerance));
+    return checked(unit, advance(model, end, unit->state.tolerance));
 }
 
 int unit_keep(Unit *unit, void **state)
