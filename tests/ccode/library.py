@@ -23,7 +23,7 @@ class Library:
         flags: of the compiler.
     """
 
-    def __init__(self, code: CCode, folder: Path, flags: tuple[str, ...] = ("-O1",)) -> None:
+    def __init__(self, code: CCode, folder: Path, flags: tuple[str, ...] = ("-O0",)) -> None:
         self.code = code
         code.write(folder)
         library = folder / "library.so"

@@ -53,6 +53,12 @@ class TablePrinter(CPrinter):
             return f"({' * '.join([base] * int(power.exp))})"
         return super()._print_Pow(power, *options, **named)
 
+    def _print_BooleanTrue(self, _: Basic) -> str:
+        return "1"
+
+    def _print_BooleanFalse(self, _: Basic) -> str:
+        return "0"
+
     def _print_Piecewise(self, pieces: Piecewise) -> str:
         text = "NAN"
         for value, condition in reversed(pieces.args):

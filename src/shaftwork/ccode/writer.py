@@ -160,11 +160,9 @@ class Writer:
             for table, k in statements.tables.items()
             for axis, points in (("X", table.xs), ("Y", table.ys))
         ]
-        helpers = (
-            ["numbers.c"] * (modes is not None or "solve(" in text)
-            + ["tables.c"] * bool(tables)
-            + ["noise.c"] * ("held_noise(" in text)
-        )
+        calls = {"points.c": "table", "table.c": "table(", "table_slope.c": "table_slope(", "noise.c": "held_noise("}
+        helpers = ["numbers.c"] * (modes is not None or "solve(" in text)
+        helpers += [file for file, call in calls.items() if call in text]
         return "\n".join(
             [
                 runtime("head.c"),

@@ -250,8 +250,8 @@ int NAME_integrate(NAME *m, double t_end, double rtol)
     return 0;
 }
 
-/* One step of the classical method of Runge and Kutta. */
-static void rk4(NAME *m, double h)
+/* The states after one step of the classical method of Runge and Kutta. */
+static void rk4(const NAME *m, double h, double *x)
 {
     double k[4][NX], z[NX];
     NAME_rhs(m, m->t, m->x, k[0]);
@@ -261,20 +261,32 @@ static void rk4(NAME *m, double h)
     NAME_rhs(m, m->t + 0.5 * h, z, k[2]);
     for (int i = 0; i < NX; i++) z[i] = m->x[i] + h * k[2][i];
     NAME_rhs(m, m->t + h, z, k[3]);
-    for (int i = 0; i < NX; i++) m->x[i] += h / 6.0 * (k[0][i] + 2.0 * (k[1][i] + k[2][i]) + k[3][i]);
+    for (int i = 0; i < NX; i++) x[i] = m->x[i] + h / 6.0 * (k[0][i] + 2.0 * (k[1][i] + k[2][i]) + k[3][i]);
 }
 
 int NAME_step_rk4(NAME *m, double h)
 {
     const double end = m->t + h;
-    for (int n = 0; n < 1000 && m->t < end; n++) {
+    double x[NX];
+    for (int n = 0; n < 100 && m->t < end; n++) {
         int which = -1;
-        const double stop = fmin(end, m->next);
-        rk4(m, stop - m->t);
-        m->t = stop;
+        const double stop = fmin(end, m->next), whole = stop - m->t;
+        double low = 0.0, high = whole;
+        rk4(m, whole, x);
+        const int meets_guard = farthest(m, stop, x, &which) > 0.0;
+        for (int halves = 0; meets_guard && halves < 50; halves++) {
+            const double part = 0.5 * (low + high);
+            rk4(m, part, x);
+            if (farthest(m, m->t + part, x, &which) > 0.0) high = part;
+            else low = part;
+        }
+        if (meets_guard) rk4(m, high, x);
+        if (meets_guard) (void)farthest(m, m->t + high, x, &which);
+        m->t = high < whole ? m->t + high : stop;
+        for (int i = 0; i < NX; i++) m->x[i] = x[i];
         m->steps++;
-        if (stop < m->next && !(farthest(m, m->t, m->x, &which) > 0.0)) continue;
-        m->met = which;
+        if (!meets_guard && m->t < m->next) continue;
+        m->met = meets_guard ? which : -1;
         const int what = NAME_event(m);
         if (what < 0) return what;
     }
