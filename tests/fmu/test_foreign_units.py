@@ -107,6 +107,17 @@ def test_a_law_outside_is_evaluated_for_arrays_as_for_numbers(spring: Path) -> N
         evaluated("no such program", 0, -1, 1.0)
 
 
+def test_a_unit_is_printed_as_a_function_and_has_no_c_code(spring: Path, tmp_path: Path) -> None:
+    net = with_spring(spring)
+    assert r"f_{2}\left(t" in net.equations().latex()
+    assert r"f_{2}\left(t" in net.equations().latex(values=True)
+    for refused in (net.compile().to_c, lambda folder: net.compile().to_fmu(folder / "unit.fmu")):
+        with pytest.raises(sw.CompileError, match="is an FMU, of which there is no C code"):
+            refused(tmp_path)
+    with pytest.raises(sw.SimulationError, match="has another law"):
+        net.simulate(0.1, engine="heyoka")
+
+
 def test_no_model_file_holds_a_unit(spring: Path, tmp_path: Path) -> None:
     with pytest.raises(sw.ModelFileError, match="program that would run"):
         with_spring(spring).save(tmp_path / "net.toml")

@@ -106,6 +106,15 @@ class External(sympy.Function):  # type: ignore[misc]
     def _eval_is_extended_real(self) -> bool:
         return True
 
+    def _eval_evalf(self, _precision: int) -> sympy.Expr:
+        handle, row, column, *arguments = self.args
+        return External(handle, row, column, *(argument.evalf() for argument in arguments))
+
+    def _ccode(self, _printer: Any) -> str:
+        raise CompileError(
+            "A part of the network is an FMU, of which there is no C code. Simulate it here, or export the rest."
+        )
+
     def _eval_derivative(self, symbol: sympy.Symbol) -> sympy.Expr:
         handle, row, column, *arguments = self.args
         slopes = [argument.diff(symbol) for argument in arguments]
