@@ -204,13 +204,15 @@ def test_names_of_networks_become_names_in_c() -> None:
     assert c_name("2 Massen, größer") == "model_2_Massen_gr_er"
     assert c_name("double") == "double_model"
     assert c_name("机") == "model"
+    assert c_name("m") == "m_model"  # the code calls an instance m
+    assert c_name("sin") == "sin_model"
 
 
 @pytest.mark.parametrize(
     ("arguments", "kind", "words"),
     [
         ({"name": "two words"}, sw.ParameterError, "must be a name in C"),
-        ({"name": "int"}, sw.ParameterError, "no word of the language"),
+        ({"name": "int"}, sw.ParameterError, "nothing that the code itself"),
         ({"inputs": ["J1.J"]}, sw.ParameterError, "There are: 'motor.tau'"),
         ({"inputs": "motor.tau"}, sw.ParameterError, "list of names"),
         ({"outputs": ["J1.power"]}, sw.SignalError, "is an energy, a power"),
@@ -229,8 +231,12 @@ def test_what_has_no_code_is_refused_by_name() -> None:
     waves.add(sw.Inertia("J2", J=1.0), "b")
     with pytest.raises(CompileError, match="travelling waves"):
         c_code(waves.compile())
-    with pytest.raises(CompileError, match="'gear' of 'train' loses power"):
-        c_code(lossy().compile())
+    stopped = lossy()
+    stopped.add(sw.HardStop("stop", upper=0.1), "b")
+    with pytest.raises(
+        CompileError, match="'gear' of 'train' loses power by the direction of its torque, beside 'stop'"
+    ):
+        c_code(stopped.compile())
     many = sw.Network("many")
     for k in range(9):
         many.add(sw.Inertia(f"J{k}", J=1.0), f"n{k}")
@@ -253,6 +259,16 @@ def lossy() -> sw.Network:
     net.add(sw.LossyGear("gear", ratio=2.0, efficiency=0.9), "a", "b")
     net.add(sw.Inertia("J2", J=1.0), "b")
     return net
+
+
+def test_gears_that_rub_turn_round_as_in_the_library(tmp_path: Path) -> None:
+    net = lossy()
+    net.add(sw.DryFriction("rubs", tau_c=0.5), "b")
+    model = net.compile()
+    library = Library(c_code(model), tmp_path)
+    library.call("integrate", 8.0, RTOL)
+    assert difference(library, model.simulate(8.0, rtol=RTOL, t_eval=50)) < MOTION
+    assert library.struct.events > 2
 
 
 def test_a_motion_that_is_too_stiff_says_so(tmp_path: Path) -> None:

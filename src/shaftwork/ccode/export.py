@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from shaftwork.ccode.texts import runtime_names
 from shaftwork.ccode.writer import Variable, Writer
 from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME
@@ -16,44 +17,48 @@ from shaftwork.core.files import replaced
 from shaftwork.network.netlist import listed
 from shaftwork.pipeline.model import Model
 
-RESERVED = [
-    "auto",
-    "break",
-    "case",
-    "char",
-    "const",
-    "continue",
-    "default",
-    "do",
-    "double",
-    "else",
-    "enum",
-    "extern",
-    "float",
-    "for",
-    "goto",
-    "if",
-    "inline",
-    "int",
-    "long",
-    "main",
-    "register",
-    "restrict",
-    "return",
-    "short",
-    "signed",
-    "sizeof",
-    "static",
-    "struct",
-    "switch",
-    "typedef",
-    "union",
-    "unsigned",
-    "void",
-    "volatile",
-    "while",
-]
-"""Words that no name in C can be."""
+RESERVED = frozenset(
+    [
+        "auto",
+        "continue",
+        "extern",
+        "float",
+        "goto",
+        "inline",
+        "main",
+        "register",
+        "short",
+        "signed",
+        "typedef",
+        "union",
+        "unsigned",
+        "volatile",
+        "abs",
+        "acos",
+        "acosh",
+        "asin",
+        "asinh",
+        "atan",
+        "atan2",
+        "atanh",
+        "cbrt",
+        "cos",
+        "cosh",
+        "erf",
+        "exp",
+        "hypot",
+        "log",
+        "log10",
+        "log2",
+        "pow",
+        "sin",
+        "sinh",
+        "sqrt",
+        "tan",
+        "tanh",
+    ]
+)
+"""Words of the language and its mathematics that the runtime does not use; only asked for membership."""
 LONGEST = 40
 """Signs of a name: 63 of a function's name count in C99, and what it does stands behind the name."""
 RUNNING = 1.0
@@ -145,7 +150,12 @@ def c_name(title: str) -> str:
     """A name in C for a title: "crane train 2" is crane_train_2."""
     plain = re.sub(r"\W+", "_", title, flags=re.ASCII).strip("_")[:LONGEST] or "model"
     plain = plain if plain[0].isalpha() else f"model_{plain}"[:LONGEST]
-    return f"{plain}_model" if plain in RESERVED else plain
+    return f"{plain}_model" if is_taken(plain) else plain
+
+
+def is_taken(name: str) -> bool:
+    """Whether a name stands for something in the code that is the same for all models."""
+    return name in RESERVED or name in runtime_names() or re.fullmatch(r"[a-z]\d+", name) is not None
 
 
 def checked_name(name: Any) -> str:
@@ -161,7 +171,7 @@ def checked_name(name: Any) -> str:
     ):
         raise ParameterError(
             f"name = {name!r} must be a name in C, such as 'crane': at most {LONGEST} letters, digits and _, a letter "
-            "first, and no word of the language. All functions of the code begin with it."
+            "first, and nothing that the code itself is made of. All functions of the code begin with it."
         )
     return name
 

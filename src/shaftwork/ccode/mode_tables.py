@@ -54,11 +54,13 @@ class ModeTables:
                 f"'{title}' has {count} sets of equations, of all combinations in which {listed(self.machines)} are "
                 f"rigid, and C code has at most {MOST_SETS}. Give contacts a stiffness c, or simulate it here."
             )
-        if self._model.form.loses_power:
-            parts = [part.name for part in self._model.form.graph.parts for m in part.modes if m.passes_on]
+        gears = [machine for machine in self._machines if machine.modes.passes_on]
+        others = [machine.name for machine in self._machines if machine not in gears and _strikes(machine)]
+        if self._model.form.loses_power and (others or any(one.form.has_impulses for one in self.sets)):
+            struck = f"beside {listed(others)}" if others else "behind a source that jumps"
             raise CompileError(
-                f"{listed(parts)} of '{title}' loses power by the direction of its torque, of which there is no C "
-                "code. Take efficiency=1 and a damper."
+                f"{listed([gear.name for gear in gears])} of '{title}' loses power by the direction of its torque, "
+                f"{struck}: of impacts through it there is no C code. Take efficiency=1, or a stiffness c of contacts."
             )
 
     @cached_property
@@ -310,6 +312,11 @@ _MODE_NAME = """const char *NAME_mode_name(int machine, int mode)
     return told ? MODE_NAMES[FIRST_NAME[machine] + mode] : "";
 }
 """
+
+
+def _strikes(machine: ModeMachine) -> bool:
+    """Whether a machine becomes rigid by an impact; frictions pass a limited torque and no impulse."""
+    return any(len(machine.modes[name].gives_way) < 2 for name in machine.rigid_modes)
 
 
 def _integers(name: str, values: Sequence[int]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from functools import cache
 from importlib.resources import files
 
 from shaftwork.ccode.printing import function, text_of
@@ -35,3 +36,11 @@ def filled(text: str, name: str, places: Mapping[str, object]) -> str:
     """C code with the name of the model and the sizes of its arrays."""
     text = re.sub(r"@(\w+)@", lambda match: str(places[match[1]]), text)
     return re.sub(r"\bNAME(?=\b|_)", name, re.sub(r"\bNAME_H\b", f"{name.upper()}_H", text))
+
+
+@cache
+def runtime_names() -> frozenset[str]:
+    """All names and words in the C code that is the same for all models; only asked for membership."""
+    folder = files(__package__ or "").joinpath("runtime")
+    texts = (re.sub(r"/\*.*?\*/", "", file.read_text(encoding="utf-8"), flags=re.DOTALL) for file in folder.iterdir())
+    return frozenset(word for text in texts for word in re.findall(r"[A-Za-z_]\w*", text))
