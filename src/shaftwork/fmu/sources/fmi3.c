@@ -37,6 +37,12 @@ static fmi3Status status(Unit *unit, int failed)
     return fmi3OK;
 }
 
+/* All variables are scalars. */
+static int wrong_size(Unit *unit, size_t n, size_t count)
+{
+    return n == count ? 0 : unit_refuse(unit, "There must be as many values as value references.");
+}
+
 static fmi3Instance instance(fmi3String token, bool co_simulation, fmi3Environment environment, fmi3Log log)
 {
     Unit *unit = unit_new(token, co_simulation);
@@ -105,13 +111,13 @@ EXPORT fmi3Status fmi3Reset(fmi3Instance c) { unit_reset(c); return fmi3OK; }
 EXPORT fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3Reference references[], size_t count, double values[],
                                  size_t n)
 {
-    return status(c, n != count || unit_get(c, references, count, values));
+    return status(c, wrong_size(c, n, count) || unit_get(c, references, count, values));
 }
 
 EXPORT fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3Reference references[], size_t count,
                                  const double values[], size_t n)
 {
-    return status(c, n != count || unit_set(c, references, count, values));
+    return status(c, wrong_size(c, n, count) || unit_set(c, references, count, values));
 }
 
 /* There are no variables of other types. */
@@ -204,7 +210,7 @@ EXPORT fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3Referen
                                                const fmi3Reference knowns[], size_t n_knowns, const double seed[],
                                                size_t n_seed, double sensitivity[], size_t n_sensitivity)
 {
-    return status(c, n_seed != n_knowns || n_sensitivity != n_unknowns
+    return status(c, wrong_size(c, n_seed, n_knowns) || wrong_size(c, n_sensitivity, n_unknowns)
                       || unit_slope(c, unknowns, n_unknowns, knowns, n_knowns, seed, sensitivity));
 }
 
