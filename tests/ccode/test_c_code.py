@@ -214,7 +214,7 @@ def test_names_of_networks_become_names_in_c() -> None:
         ({"name": "two words"}, sw.ParameterError, "must be a name in C"),
         ({"name": "int"}, sw.ParameterError, "nothing that the code itself"),
         ({"inputs": ["J1.J"]}, sw.ParameterError, "There are: 'motor.tau'"),
-        ({"inputs": "motor.tau"}, sw.ParameterError, "list of names"),
+        ({"inputs": [3]}, sw.ParameterError, "3 is no name"),
         ({"outputs": ["J1.power"]}, sw.SignalError, "is an energy, a power"),
         ({"outputs": ["J9.omega"]}, sw.SignalError, "does not exist"),
     ],

@@ -8,14 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from shaftwork.ccode.equation_set import CompiledNetwork
 from shaftwork.ccode.texts import runtime_names
-from shaftwork.ccode.writer import Variable, Writer
+from shaftwork.ccode.writer import CodeWriter, Variable
 from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.core.files import replaced
 from shaftwork.network.netlist import listed
-from shaftwork.pipeline.model import Model
+from shaftwork.pipeline.arguments import Names, as_names
 
 RESERVED = frozenset(
     [
@@ -108,11 +109,11 @@ class CCode:
 
 
 def c_code(
-    model: Model,
+    model: CompiledNetwork,
     *,
     name: str | None = None,
-    inputs: Sequence[str] = (),
-    outputs: Sequence[str] | None = None,
+    inputs: Names = (),
+    outputs: Names = None,
     t_end: float = 10.0,
 ) -> CCode:
     """A model in C; arguments as of `Model.to_c`.
@@ -128,11 +129,11 @@ def c_code(
         CompileError: the equations have no code in C.
     """
     called = c_name(model.name) if name is None else checked_name(name)
-    values = _input_values(model, inputs)
+    values = _input_values(model, as_names(inputs or ()))
     if values:
         model = model.with_values(dict.fromkeys(values, RUNNING))
     _refuse(model, [*values])
-    writer = Writer(model, values, outputs)
+    writer = CodeWriter(model, values, None if outputs is None else as_names(outputs))
     return CCode(
         called,
         *writer.texts(called, t_end),
@@ -176,7 +177,7 @@ def checked_name(name: Any) -> str:
     return name
 
 
-def _input_values(model: Model, inputs: Sequence[str]) -> dict[str, float]:
+def _input_values(model: CompiledNetwork, inputs: Sequence[str]) -> dict[str, float]:
     """The default value of each input: that of its law at t = 0, or 0 where it depends on more than the time.
 
     Raises:
@@ -186,8 +187,6 @@ def _input_values(model: Model, inputs: Sequence[str]) -> dict[str, float]:
     # the momentum of an inertia that changes would need the rate of its change
     pairs = ((name, part) for name, part in parts.items() if part.role != "store")
     laws = [f"{name}.{key}" for name, part in pairs for key, item in part.declared.items() if item.law]
-    if isinstance(inputs, str):
-        raise ParameterError(f"inputs = {inputs!r} must be a list of names, such as [{inputs!r}].")
     values: dict[str, float] = {}
     for name in inputs:
         if name not in laws:
@@ -201,7 +200,7 @@ def _input_values(model: Model, inputs: Sequence[str]) -> dict[str, float]:
     return values
 
 
-def _refuse(model: Model, inputs: Sequence[str]) -> None:
+def _refuse(model: CompiledNetwork, inputs: Sequence[str]) -> None:
     """Refuse what has no code in C.
 
     Raises:

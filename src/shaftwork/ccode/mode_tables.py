@@ -6,10 +6,11 @@ import math
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from itertools import product
+from typing import Any
 
 from sympy import Expr, Integer, Piecewise
 
-from shaftwork.ccode.equation_set import EquationSet
+from shaftwork.ccode.equation_set import CompiledNetwork, EquationSet
 from shaftwork.ccode.printing import Statements, array, function, text_of
 from shaftwork.ccode.set_functions import SetFunctions
 from shaftwork.ccode.texts import dispatcher, runtime
@@ -19,11 +20,9 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Leave
 from shaftwork.core.errors import CompileError, NetworkError
 from shaftwork.hybrid.consistency import rounding_moves
-from shaftwork.hybrid.hybrid_model import HybridModel
 from shaftwork.hybrid.modes.mode_machines import ModeGuards, ModeMachine, ModeNames
 from shaftwork.network.graph import GROUND
 from shaftwork.network.netlist import listed
-from shaftwork.pipeline.model import Model
 
 MOST_SETS = 256
 """Sets of equations: more would make code that takes minutes to compile."""
@@ -40,9 +39,8 @@ class ModeTables:
         CompileError: there are too many sets of equations, or a gear passes on torques by their direction.
     """
 
-    def __init__(self, model: Model) -> None:
-        assert isinstance(model, HybridModel)  # noqa: S101 (only such a model has phases)
-        self._model, self._sets = model, model.equation_sets
+    def __init__(self, model: CompiledNetwork) -> None:
+        self._model, self._sets = model, model.equation_sets  # type: ignore[attr-defined]  # of a model with phases
         self._machines: tuple[ModeMachine, ...] = self._sets.machines
         self._refuse()
 
@@ -79,9 +77,9 @@ class ModeTables:
         return [machine.number for machine in self._machines]
 
     @cached_property
-    def _by_forms(self) -> dict[tuple[str, ...], Model | None]:
+    def _by_forms(self) -> dict[tuple[str, ...], Any | None]:
         """The model of each combination of forms; None where its equations contradict each other."""
-        models: dict[tuple[str, ...], Model | None] = {}
+        models: dict[tuple[str, ...], Any | None] = {}
         for forms in product(*self._forms):
             try:
                 models[forms] = self._sets.of(self._of_forms(forms)).model
@@ -213,7 +211,7 @@ class ModeTables:
         cells = [(machine, k, mode) for k, machine in enumerate(machines) for mode in padded[k]]
         longest = max((len(mode.leaves) for modes in options for mode in modes), default=1)
         yield f"enum {{ MOST_MODES = {most}, MOST_LEAVES = {max(longest, 1)}, N_LEAVES = {len(self._leaves)} }};"
-        switching = any(one.model.arrays.inputs.switching for one in self.sets)
+        switching = any(one.model.bind().program.inputs.switching for one in self.sets)
         bends = any(one.rows.across[k].has(TIME) for one in self.sets for k in one.form.across_sources)
         together = self._model.netlist.impacts == "together"
         torques = [name in StateTransfer(self.sets[0].form).through for name in StateTransfer(self.sets[0].form).names]

@@ -19,7 +19,7 @@ from shaftwork.network.kinds import Kind
 
 
 @dataclass(frozen=True)
-class Layout:
+class ArrayLayout:
     """What stands in which place of the arrays of the C code.
 
     Args:
@@ -44,7 +44,7 @@ class SetFunctions:
         layout: of all sets.
     """
 
-    def __init__(self, number: int, equations: EquationSet, layout: Layout) -> None:
+    def __init__(self, number: int, equations: EquationSet, layout: ArrayLayout) -> None:
         self.number, self.layout = number, layout
         self.form, self.rows, self.observables = equations.form, equations.rows, equations.observables
         self.places = [layout.states.index(state.name) for state in self.form.states]

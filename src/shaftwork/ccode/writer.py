@@ -8,17 +8,16 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from sympy import Symbol
 
-from shaftwork.ccode.equation_set import EquationSet
+from shaftwork.ccode.equation_set import CompiledNetwork, EquationSet
 from shaftwork.ccode.instants import Instants
 from shaftwork.ccode.printing import Statements, array
-from shaftwork.ccode.set_functions import Layout, SetFunctions, stored_symbol
+from shaftwork.ccode.set_functions import ArrayLayout, SetFunctions, stored_symbol
 from shaftwork.ccode.texts import dispatcher, filled, names_of, runtime
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import SignalError
 from shaftwork.formulation.form import Names
 from shaftwork.network.netlist import listed
-from shaftwork.pipeline.model import Model
 
 if TYPE_CHECKING:
     from shaftwork.ccode.mode_tables import ModeTables
@@ -47,7 +46,7 @@ class Variable(NamedTuple):
     value: float = 0.0
 
 
-class Writer:
+class CodeWriter:
     """Writes the texts of a model.
 
     Args:
@@ -56,7 +55,7 @@ class Writer:
         wanted: names of the outputs, or None for all quantities.
     """
 
-    def __init__(self, model: Model, inputs: Mapping[str, float], wanted: Sequence[str] | None) -> None:
+    def __init__(self, model: CompiledNetwork, inputs: Mapping[str, float], wanted: Sequence[str] | None) -> None:
         self._model, self._inputs, self._wanted = model, inputs, wanted
 
     @cached_property
@@ -147,7 +146,7 @@ class Writer:
         modes, statements = self.modes, Statements(self._names, self._model.name)
         names = (tuple(v.name for v in some) for some in (self.states, self.outputs))
         states, outputs = names
-        layout = Layout(states, self.stores, outputs, statements)
+        layout = ArrayLayout(states, self.stores, outputs, statements)
         functions = [SetFunctions(number, one, layout) for number, one in enumerate(self.sets)]
         still = [symbol for symbol, code in self._names.items() if code.startswith(("m->p", "m->u"))]
         body = [one.text for one in functions]

@@ -13,7 +13,7 @@ import numpy as np
 from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.model_observer import ModelObserver
-from shaftwork.codegen.start_values import initial_state, with_others
+from shaftwork.codegen.start_values import initial_state
 from shaftwork.codegen.undefined_laws import refuse_vanishing
 from shaftwork.core.calls import BoundedCache, Callback
 from shaftwork.core.errors import Diagnostic, ParameterError
@@ -366,7 +366,7 @@ class Model(ExportedModel):
     def to_c(
         self, folder: str | Path, *, name: str | None = None, inputs: Names = (), outputs: Names = None
     ) -> tuple[Path, ...]:
-        """Write the model as C code: NAME.h, NAME.c and an example main.c; returns their paths.
+        """Write the model as C99 code into a folder: NAME.h, NAME.c and an example main.c; returns their paths.
 
         Args:
             folder: is made where there is none.
@@ -375,31 +375,12 @@ class Model(ExportedModel):
             outputs: any quantities; by default all but energies and powers.
 
         Raises:
-            CompileError: there is no such code, as of travelling waves; says why.
-            ParameterError, SignalError: a name is none.
+            CompileError, ParameterError, SignalError: there is no such code, name, input or output; says why.
         """
         from shaftwork.ccode.export import c_code
 
-        return c_code(self, name=name, inputs=inputs or (), outputs=outputs).write(folder)
+        return c_code(self, name=name, inputs=inputs, outputs=outputs).write(folder)
 
     def _variant(self, values: Mapping[str, float]) -> Model:
         """The model of the same network with other values where these change its structure; the last few are kept."""
-        return self._variants(tuple(sorted(values.items())), lambda: self._rebuild(self.netlist.with_values(values)))
-
-
-def steady_start(
-    model: Model, others: Mapping[str, float], parameters: Mapping[str, float] | None = None
-) -> dict[str, float]:
-    """Start values: the steady state with the laws at t = 0 s, in which some stores have other values.
-
-    Args:
-        model: the compiled network.
-        others: start values by name; what is stored elsewhere is that of the steady state.
-        parameters: values that differ from the network's.
-
-    Raises:
-        ParameterError: a start value is none.
-        SimulationError: nothing comes to rest or to a steady speed.
-    """
-    steady = model.steady_state(t=0.0, parameters=parameters)
-    return with_others(model.start_equations(parameters or {}), steady, others, 0.0) if others else dict(steady)
+        return self._variants(tuple(sorted(values.items())), lambda: self.with_values(values))
