@@ -98,8 +98,8 @@ class Counts(ctypes.Structure):
     _fields_ = tuple((name, ctypes.c_long) for name in ("steps", "rejected", "rhs"))
 
 
-def c_dop853() -> tuple[Solve, Counts]:
-    """Compile dop853.c; the solver and the counts that its latest call left behind.
+def c_dop853(times: Array = TIMES) -> tuple[Solve, Counts]:
+    """Compile dop853.c; the solver, its torque at some times in s, and the counts that its latest call left behind.
 
     Raises:
         RuntimeError: when a call's step size underflows.
@@ -117,10 +117,10 @@ def c_dop853() -> tuple[Solve, Counts]:
         pointer(_Crane), doubles, number, number, number, doubles, doubles, ctypes.c_int, doubles, pointer(Counts)
     ]  # fmt: skip
     crane = _Crane(J1, J2, C, D, PULL_OUT, S_K, OMEGA_SYNC, TAU_W, OMEGA_S)
-    states, counts = np.empty((TIMES.size, 3)), Counts()
+    states, counts = np.empty((times.size, 3)), Counts()
 
     def solve(rtol: float) -> Array:
-        if run(crane, START, 0.0, T_END, rtol, rtol * SCALE, TIMES, TIMES.size, states, counts):
+        if run(crane, START, 0.0, T_END, rtol, rtol * SCALE, times, times.size, states, counts):
             message = f"the step size underflows at rtol {rtol:g}"
             raise RuntimeError(message)
         return shaft_torque(states.T)
@@ -204,9 +204,11 @@ def cpu_of(call: Callable[[], object], samples: int = 9, shortest: float = 0.02)
     return statistics.median(spent)
 
 
-def work_precision(solve: Solve, truth: Array, rtols: Sequence[float] = RTOLS, samples: int = 9) -> tuple[Point, ...]:
-    """True error and CPU of one solver over a range of tolerances."""
-    largest = float(np.max(np.abs(truth)))
+def work_precision(
+    solve: Solve, truth: Array, rtols: Sequence[float] = RTOLS, samples: int = 9, scale: float | None = None
+) -> tuple[Point, ...]:
+    """True error, as part of the largest true value or of a scale, and CPU of one solver over a range of tolerances."""
+    largest = float(np.max(np.abs(truth))) if scale is None else scale
     solve(rtols[0])
     return tuple(
         Point(rtol, float(np.max(np.abs(solve(rtol) - truth))) / largest, cpu_of(lambda r=rtol: solve(r), samples))

@@ -191,7 +191,7 @@ def same(old: str, new: str) -> bool:
 
 def components() -> dict[str, type[Component]]:
     """The components of the package by name, family by family; the registry also holds those of users."""
-    own = ((name, cls) for name, cls in REGISTRY.items() if cls.__module__.startswith("shaftwork."))
+    own = ((name, cls) for name, cls in REGISTRY.items() if cls.__module__.startswith("shaftwork.components."))
     return dict(sorted(own, key=lambda item: FAMILIES.index(item[1].__module__.rpartition(".")[2])))
 
 

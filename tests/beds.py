@@ -41,7 +41,7 @@ VALUES = {
 
 def registered() -> list[str]:
     """The components of the library."""
-    return [name for name, kind in REGISTRY.items() if kind.__module__.startswith("shaftwork.")]
+    return [name for name, kind in REGISTRY.items() if kind.__module__.startswith("shaftwork.components.")]
 
 
 def bed_of(name: str) -> sw.Network:

@@ -108,6 +108,8 @@ if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
         ModelicaModel as ModelicaModel,
         read_modelica as read_modelica,
     )
+    from shaftwork.fmu.fmu_parts import FMUSpeed as FMUSpeed, FMUTorque as FMUTorque
+    from shaftwork.fmu.foreign_unit import FMU as FMU
     from shaftwork.pipeline.model import Model as Model
     from shaftwork.pipeline.network import Network as Network
     from shaftwork.reporting.report import Report as Report, report as report
@@ -168,6 +170,8 @@ _HOME = {
     "shaftwork.motionfiles.loading": ("load_solution",),
     "shaftwork.opentorsion.reader": ("from_opentorsion",),
     "shaftwork.modelica.reading.modelica_reader": ("ModelicaModel", "read_modelica"),
+    "shaftwork.fmu.fmu_parts": ("FMUSpeed", "FMUTorque"),
+    "shaftwork.fmu.foreign_unit": ("FMU",),
     "shaftwork.pipeline.model": ("Model",),
     "shaftwork.pipeline.network": ("Network",),
     "shaftwork.reporting.report": ("Report", "report"),

@@ -26,6 +26,7 @@ USES = {
     "analogues": "net.circuit().simulate(0.1)",
     "control": "net.compile().linearize().to_scipy()",
     "modelica": "net.to_modelica()",
+    "ccode": "net.compile().to_c(folder)",
     "studies": "sw.studies.work_precision",
     "spice": "net.to_spice()",
     "animation": "net.simulate(0.1).animate()",
@@ -36,6 +37,7 @@ USES = {
     "stepper": "net.compile().start().step(0.1)",
     "motionfiles": "net.simulate(0.1).save(folder / 'motion.nc')",
     "opentorsion": "sw.from_opentorsion({'components': [{'name': 'A', 'elements': []}]})",
+    "fmu": "net.compile().to_fmu(folder / 'net.fmu', binary=False)",
 }
 """By feature, something small that takes it."""
 
@@ -44,11 +46,13 @@ NEEDS = {
     "motionfiles": ("modelfiles",),
     "reporting": ("latex", "drawing", "modelfiles"),
     "live": ("reporting", "latex", "drawing", "modelfiles", "frequency", "animation"),
+    "fmu": ("ccode",),
 }
 """By feature, those that it is made of."""
 
 JOINS = {
     "animation": ("shaftwork.live",),
+    "ccode": ("shaftwork.fmu.export_unit",),
     "drawing": ("shaftwork.reporting", "shaftwork.live"),
     "modelfiles": ("shaftwork.reporting", "shaftwork.live", "shaftwork.motionfiles"),
     "reporting": ("shaftwork.live",),
@@ -58,6 +62,7 @@ JOINS = {
         "shaftwork.waves.hybrid_waves",
         "shaftwork.sweep.hybrid_ensemble",
         "shaftwork.stepper.hybrid_moments",
+        "shaftwork.ccode.mode_tables",
     ),
     "latex": (
         "shaftwork.lagrange.lagrange_print",

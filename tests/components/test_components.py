@@ -20,7 +20,7 @@ from shaftwork.network.graph import resolve
 from shaftwork.network.kinds import Kind
 from shaftwork.network.templates import make_template
 
-OWN = [name for name, kind in REGISTRY.items() if kind.__module__.startswith("shaftwork.")]
+OWN = [name for name, kind in REGISTRY.items() if kind.__module__.startswith("shaftwork.components.")]
 
 
 TOGETHER = {

@@ -38,7 +38,7 @@ MEASURING = {"StateSpaceController", "TransferFunctionController"}
 """They read quantities of others, which are other ones at the reference shaft: `refer` refuses the network."""
 ALONG_A_LINE = {"Rope"}
 """There is no such part that turns."""
-BUILT_IN = {name: kind for name, kind in REGISTRY.items() if kind.__module__.startswith("shaftwork.")}
+BUILT_IN = {name: kind for name, kind in REGISTRY.items() if kind.__module__.startswith("shaftwork.components.")}
 
 
 def seen(kind: type[sw.Component], scale: Scale, domain: Domain = ROTATION) -> Any:

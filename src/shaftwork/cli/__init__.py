@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from shaftwork.cli import drawings, frequencies, inspection, live, reports, run, studies
+from shaftwork.cli import drawings, export, frequencies, inspection, live, reports, run, studies
 from shaftwork.cli.command import Command
 from shaftwork.core.errors import ShaftworkError, SimulationError
 from shaftwork.core.notices import VALUES, on_the_command_line
@@ -32,7 +32,7 @@ COMMANDS: tuple[Command, ...] = (
     frequencies.torsional,
     studies.sweep,
     studies.compare,
-    inspection.export,
+    export.export,
 )
 
 

@@ -152,7 +152,7 @@ def start_of(options: Namespace, model: Model) -> dict[str, float] | None:
         ParameterError: a start value is none.
         SimulationError: there is no steady state.
     """
-    from shaftwork.pipeline.model import steady_start
+    from shaftwork.pipeline.settled import steady_start
 
     values = point(options.initial, option="--initial")
     return steady_start(model, values) if options.steady else values or None

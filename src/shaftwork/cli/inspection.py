@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 from argparse import ArgumentParser, Namespace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shaftwork.cli.command import FALLBACK_END, Data, Say, command, load
-from shaftwork.core.errors import ParameterError
 
 if TYPE_CHECKING:
     from shaftwork.equations.records import Equations
@@ -88,30 +84,3 @@ def _typeset(equations: Equations, options: Namespace, title: str) -> str:
         return lagrange.document(values=values, title=title) if whole else lagrange.latex(values=values)
     form = options.form
     return equations.document(form, values=values, title=title) if whole else equations.latex(form, values=values)
-
-
-def export_options(parser: ArgumentParser) -> None:
-    """The options of `shaftwork export`."""
-    parser.add_argument("file", metavar="NEW.toml", nargs="?", help="file to write (default: the screen)")
-
-
-@command("the model file of a scene, to change and run", export_options)
-def export(options: Namespace, say: Say) -> Data:
-    """The model file of a scene, or of another model file with other values."""
-    from shaftwork.modelfiles.storage import netlist_text
-
-    net, scene = load(options)
-    if options.file is None:
-        say(netlist_text(net.netlist()).rstrip("\n"))
-    else:
-        path = Path(options.file)
-        if path.suffix != ".toml":
-            raise ParameterError(f"'{path}' must end in .toml, so that the other commands take it for a model file.")
-        if path.exists():
-            raise ParameterError(f"'{path}' exists already. Give another name, or delete it.")
-        net.save(path)
-        say(f"written: {path}")
-    if scene:
-        line = shlex.join(["shaftwork", "run", options.file or "FILE.toml", "--t-end", f"{scene.t_end:g}"])
-        print(f"A model file has no end time. For the motion of the scene: {line}", file=sys.stderr)
-    return {}

@@ -146,7 +146,7 @@ def bindable(
     printer, bound = _reading(parameters, both)
     arguments_printer, read = _reading(arguments, both)
     printer.names |= arguments_printer.names
-    shared = in_common(printer, both)
+    shared = shared_parts(printer, both)
     lists = [[printer.doprint(expression) for expression in expressions] for expressions in (first, second)]
     everything, (t, x) = {**arguments, **parameters}, arguments
     slow = f"second({', '.join(everything)})"
@@ -302,7 +302,7 @@ def _function(
     `sympy.lambdify` builds every expression anew to rename its symbols and to share its parts: most of the time in
     which a network is compiled. A printer that knows the names does without.
     """
-    shared = in_common(printer, [result] if isinstance(result, Expr) else result)
+    shared = shared_parts(printer, [result] if isinstance(result, Expr) else result)
     lines += [f"{name} = {code}" for name, code in shared.items()]
     values = printer.doprint(result) if isinstance(result, Expr) else f"[{', '.join(map(printer.doprint, result))}]"
     return _compiled("function", arguments, [*lines, f"return {values}"], names)
@@ -329,7 +329,7 @@ def executed(source: str, name: str, names: dict[str, Any], namespace: dict[str,
     return function
 
 
-def in_common(printer: Any, expressions: Sequence[Expr]) -> dict[str, str]:
+def shared_parts(printer: Any, expressions: Sequence[Expr]) -> dict[str, str]:
     """The code of what stands in expressions more than once, by the names that the printer knows from here on."""
     codes = {}
     for number, shared in enumerate(_repeated(expressions)):

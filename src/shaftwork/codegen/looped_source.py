@@ -67,7 +67,7 @@ def stencils_of(rows: Rows) -> tuple[Stencil, ...]:
     return tuple(written)
 
 
-class _C(RealNumbers, C99CodePrinter):  # type: ignore[misc]
+class CPrinter(RealNumbers, C99CodePrinter):  # type: ignore[misc]
     """C's math functions; the sign and the step are not among them."""
 
     settings = MappingProxyType({"order": "none", "math_macros": {}})  # M_PI is not in the standard
@@ -186,7 +186,7 @@ _LANGUAGES = {
         "    x{first} = x[{first}:{last}]",
     ),
     "c": _Language(
-        _C,
+        CPrinter,
         _IN_C,
         "    const double {name} = {value};",
         "    rates[{first}] = {rate};",

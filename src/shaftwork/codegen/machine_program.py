@@ -12,7 +12,7 @@ from numba.core.errors import NumbaError
 from sympy import Basic, Expr, Function, Symbol
 
 from shaftwork.codegen.array_form.elements import Array
-from shaftwork.codegen.code import FloatPrinter, executed, in_common, vectorised_list
+from shaftwork.codegen.code import FloatPrinter, executed, shared_parts, vectorised_list
 from shaftwork.codegen.looped_source import LoopedSource, Stencil, read_by
 from shaftwork.components.laws import NUMERICAL
 from shaftwork.components.laws import t as TIME
@@ -80,7 +80,7 @@ class MachineProgram:
             names |= {state: state.name for state in states.values()}
             rates.append(stencil.rate.xreplace(states))
         printer = _MachinePrinter(names, self._tables)
-        lines = [f"{name} = {code}" for name, code in in_common(printer, rates).items()]
+        lines = [f"{name} = {code}" for name, code in shared_parts(printer, rates).items()]
         printed = (printer.doprint(rate) for rate in rates)
         return lines + [f"rates[{stencil.first}] = {rate}" for stencil, rate in zip(stencils, printed, strict=True)]
 

@@ -8,7 +8,7 @@ from typing import Any
 import sympy
 from sympy import Basic, Expr, Max, Min, Piecewise, Symbol
 
-from shaftwork.components import noise
+from shaftwork.components import external, noise
 from shaftwork.components.tables import Interpolation, Table, interpolate, interpolation_slope
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si, is_quantity, without_unit
@@ -35,7 +35,12 @@ q = sympy.Symbol("q", real=True)
 SYMBOLS: tuple[sympy.Symbol, ...] = (t, omega, phi, v, s, u, psi, i, q)
 """Every symbol that a law may contain."""
 
-NUMERICAL = {"Interpolation": interpolate, "InterpolationSlope": interpolation_slope, **noise.NUMERICAL}
+NUMERICAL = {
+    "Interpolation": interpolate,
+    "InterpolationSlope": interpolation_slope,
+    **noise.NUMERICAL,
+    **external.NUMERICAL,
+}
 """Names and numerical functions of tables and noise, for a code printer other than `sympy.lambdify`."""
 
 

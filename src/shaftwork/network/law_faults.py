@@ -12,6 +12,7 @@ from sympy.logic.boolalg import BooleanAtom, BooleanFunction
 
 from shaftwork.components.base import Component, Port, Profile, Signal
 from shaftwork.components.branches import ACROSS, HISTORY, INTEGRAL, THROUGH, End, named_in
+from shaftwork.components.external import External, Handle
 from shaftwork.components.laws import SYMBOLS, t
 from shaftwork.components.modes import ANEW, Modes
 from shaftwork.components.noise import HeldNoise, SmoothNoise
@@ -33,7 +34,7 @@ _READS: Mapping[Kind, frozenset[sympy.Symbol]] = {
 _EVALUATED = (
     *(function.make for function in FUNCTIONS.values() if isinstance(function.make, type)),
     *(sympy.Symbol, sympy.Number, sympy.NumberSymbol, sympy.Add, sympy.Mul, sympy.Pow, sympy.Piecewise, ExprCondPair),
-    *(Table, Interpolation, InterpolationSlope, Relational, BooleanFunction, BooleanAtom),
+    *(Table, Interpolation, InterpolationSlope, Relational, BooleanFunction, BooleanAtom, External, Handle),
 )
 """The nodes of expressions that every engine can evaluate."""
 

@@ -11,9 +11,8 @@ import numpy as np
 
 from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
-from shaftwork.codegen.compiled_model import CompiledModel
 from shaftwork.codegen.model_observer import ModelObserver
-from shaftwork.codegen.start_values import initial_state, with_others
+from shaftwork.codegen.start_values import initial_state
 from shaftwork.codegen.undefined_laws import refuse_vanishing
 from shaftwork.core.calls import BoundedCache, Callback
 from shaftwork.core.errors import Diagnostic, ParameterError
@@ -40,6 +39,7 @@ from shaftwork.pipeline.arguments import (
     step_limit,
     time_span,
 )
+from shaftwork.pipeline.exported_model import ExportedModel
 from shaftwork.pipeline.implicit import IMPLICIT, PRESCRIBED, solve_loops, start_of_loops, without_states
 from shaftwork.pipeline.motion_start import (
     Ending,
@@ -64,7 +64,7 @@ VARIANTS = 8
 """Models of other structure, and choices of an engine, that are kept for later calls."""
 
 
-class Model(CompiledModel):
+class Model(ExportedModel):
     """A network as a fast function of time, states and parameters, ready to be simulated again and again.
 
     Args:
@@ -371,24 +371,10 @@ class Model(CompiledModel):
             raise ParameterError(f"parameters = {parameters!r} must map names to values, such as {{'shaft.c': 3e4}}.")
         return checked_parameters(self.netlist, parameters)
 
+    def with_values(self, values: Mapping[str, Any]) -> Model:
+        """The model of the same network with other values, "part.parameter", whatever they change."""
+        return self._rebuild(self.netlist.with_values(values))
+
     def variant(self, values: Mapping[str, float]) -> Model:
         """The model of the same network with other values where these change its structure; the last few are kept."""
-        return self._variants(tuple(sorted(values.items())), lambda: self._rebuild(self.netlist.with_values(values)))
-
-
-def steady_start(
-    model: Model, others: Mapping[str, float], parameters: Mapping[str, float] | None = None
-) -> dict[str, float]:
-    """Start values: the steady state with the laws at t = 0 s, in which some stores have other values.
-
-    Args:
-        model: the compiled network.
-        others: start values by name; what is stored elsewhere is that of the steady state.
-        parameters: values that differ from the network's.
-
-    Raises:
-        ParameterError: a start value is none.
-        SimulationError: nothing comes to rest or to a steady speed.
-    """
-    steady = model.steady_state(t=0.0, parameters=parameters)
-    return with_others(model.start_equations(parameters or {}), steady, others, 0.0) if others else dict(steady)
+        return self._variants(tuple(sorted(values.items())), lambda: self.with_values(values))

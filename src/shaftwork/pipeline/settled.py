@@ -13,7 +13,7 @@ import numpy as np
 from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.operating import steady_state
-from shaftwork.codegen.start_values import initial_state
+from shaftwork.codegen.start_values import initial_state, with_others
 from shaftwork.codegen.time_switches import Switching
 from shaftwork.codegen.undefined_laws import in_words
 from shaftwork.components.laws import t as TIME
@@ -27,6 +27,7 @@ from shaftwork.pipeline.prepared import Prepared
 
 if TYPE_CHECKING:
     from shaftwork.network.graph import CircuitGraph, GraphBranch
+    from shaftwork.pipeline.model import Model
 
 SAME = 1e-6
 """Levels of a law that differ by less than this fraction are one."""
@@ -167,3 +168,21 @@ def _quantity(graph: CircuitGraph, branch: GraphBranch) -> tuple[str, int, str]:
     shown = (signal for signal in part.component.signals().values() if signal.kind == "through")
     sign = next((signal.sign for signal in shown if signal.ends == branch.template.ends), 1)
     return part.name, sign, domain.through.unit.replace("*", " ")
+
+
+def steady_start(
+    model: Model, others: Mapping[str, float], parameters: Mapping[str, float] | None = None
+) -> dict[str, float]:
+    """Start values: the steady state with the laws at t = 0 s, in which some stores have other values.
+
+    Args:
+        model: the compiled network.
+        others: start values by name; what is stored elsewhere is that of the steady state.
+        parameters: values that differ from the network's.
+
+    Raises:
+        ParameterError: a start value is none.
+        SimulationError: nothing comes to rest or to a steady speed.
+    """
+    steady = model.steady_state(t=0.0, parameters=parameters)
+    return with_others(model.start_equations(parameters or {}), steady, others, 0.0) if others else dict(steady)

@@ -286,6 +286,10 @@ class ModeGuards:
         branch, sign = holder
         return int(sign) * self._readings.through(branch)
 
+    def of(self, machine: int, mode: str) -> tuple[ActiveGuard, ...]:
+        """The guards of one mode of a machine; none of a mode in another form."""
+        return self._leaves.get((machine, mode), ())
+
     def watched(self, modes: ModeNames) -> tuple[ActiveGuard, ...]:
         """Everything that may end one of the modes."""
         if modes not in self._ends:

@@ -1,0 +1,92 @@
+"""One set of equations of a model, as C code needs it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar, Protocol
+
+from shaftwork.codegen.array_form.arrays import BoundArrays
+from shaftwork.core.errors import CompileError
+from shaftwork.formulation.explicit_rows import BlockTooLargeError, Rows, explicit_rows
+from shaftwork.formulation.form import StateForm
+from shaftwork.formulation.observables import Observables
+from shaftwork.network.netlist import Netlist
+from shaftwork.pipeline.prepared import nominal_tolerances
+
+
+class CompiledNetwork(Protocol):
+    """What is written in C of a compiled model; `pipeline.model.Model` is one, and comes here by its door."""
+
+    phased: ClassVar[bool]
+    """Whether parts change their mode."""
+    form: StateForm
+    """Of the first mode of each part."""
+    netlist: Netlist
+    """What it was made of."""
+
+    @property
+    def name(self) -> str:
+        """Title of the network."""
+        ...
+
+    def bind(self) -> BoundArrays:
+        """The equations with their parameters."""
+        ...
+
+    def with_values(self, values: Mapping[str, Any]) -> CompiledNetwork:
+        """The model of the same network with other values."""
+        ...
+
+
+class EquationsByArrays(Protocol):
+    """Compiled equations."""
+
+    form: StateForm
+
+    def bind(self) -> BoundArrays:
+        """The equations with their parameters."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class EquationSet:
+    """One set of equations.
+
+    Args:
+        model: the compiled equations.
+    """
+
+    model: EquationsByArrays
+
+    @property
+    def form(self) -> StateForm:
+        """The state form."""
+        return self.model.form
+
+    @cached_property
+    def rows(self) -> Rows:
+        """The state equations as expressions.
+
+        Raises:
+            CompileError: too many rates are coupled.
+        """
+        try:
+            return explicit_rows(self.form)
+        except BlockTooLargeError:
+            raise CompileError(
+                f"'{self.form.graph.name}' has no equations line by line: more than three speeds or torques are "
+                "coupled rigidly. Put a spring between some of the gears, or simulate it here."
+            ) from None
+
+    @cached_property
+    def observables(self) -> Observables:
+        """Expressions of all quantities."""
+        return Observables(self.form, self.rows)
+
+    @cached_property
+    def nominal(self) -> Mapping[str, float]:
+        """The absolute tolerance of each state, as part of the relative one."""
+        sizes = nominal_tolerances(self.form, self.model.bind().part.coefficients)
+        return dict(zip((state.name for state in self.form.states), sizes.tolist(), strict=True))

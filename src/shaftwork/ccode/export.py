@@ -1,0 +1,226 @@
+"""A compiled model as files of C code."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from shaftwork.ccode.equation_set import CompiledNetwork
+from shaftwork.ccode.texts import runtime_names
+from shaftwork.ccode.writer import CodeWriter, Variable
+from shaftwork.components.laws import as_expression
+from shaftwork.components.laws import t as TIME
+from shaftwork.core.errors import CompileError, ParameterError
+from shaftwork.core.files import replaced
+from shaftwork.network.netlist import listed
+from shaftwork.pipeline.arguments import Names, as_names
+
+RESERVED = frozenset(
+    [
+        "auto",
+        "continue",
+        "extern",
+        "float",
+        "goto",
+        "inline",
+        "main",
+        "register",
+        "short",
+        "signed",
+        "typedef",
+        "union",
+        "unsigned",
+        "volatile",
+        "abs",
+        "acos",
+        "acosh",
+        "asin",
+        "asinh",
+        "atan",
+        "atan2",
+        "atanh",
+        "cbrt",
+        "cos",
+        "cosh",
+        "erf",
+        "exp",
+        "hypot",
+        "log",
+        "log10",
+        "log2",
+        "pow",
+        "sin",
+        "sinh",
+        "sqrt",
+        "tan",
+        "tanh",
+    ]
+)
+"""Words of the language and its mathematics that the runtime does not use; only asked for membership."""
+LONGEST = 40
+"""Signs of a name: 63 of a function's name count in C99, and what it does stands behind the name."""
+RUNNING = 1.0
+"""The value that stands for an input while equations are made: an exact zero would leave it out of them."""
+
+
+@dataclass(frozen=True)
+class CCode:
+    """A model in C: the texts of its files, and what stands in its arrays.
+
+    Args:
+        name: of the model in C, with which all public names of the code begin.
+        header: text of its header.
+        source: text of its source.
+        example: text of an example program.
+        states, parameters, inputs, outputs: in the order of the arrays of the code.
+        stores: names of all that is stored, whose start values may be set.
+        machines: names of the parts that change their mode.
+        guards: how many guards there are at most.
+    """
+
+    name: str
+    header: str
+    source: str
+    example: str
+    states: tuple[Variable, ...]
+    parameters: tuple[Variable, ...]
+    inputs: tuple[Variable, ...]
+    outputs: tuple[Variable, ...]
+    stores: tuple[str, ...]
+    machines: tuple[str, ...]
+    guards: int
+
+    def write(self, folder: str | Path) -> tuple[Path, ...]:
+        """Write the files into a folder, which is made where there is none; returns their paths.
+
+        Raises:
+            OSError: a file cannot be written.
+        """
+        place = Path(folder)
+        texts = {f"{self.name}.h": self.header, f"{self.name}.c": self.source, "main.c": self.example}
+        place.mkdir(parents=True, exist_ok=True)
+        for file, text in texts.items():
+            with replaced(place / file) as stream:
+                stream.write(text)
+        return tuple(place / file for file in texts)
+
+
+def c_code(
+    model: CompiledNetwork,
+    *,
+    name: str | None = None,
+    inputs: Names = (),
+    outputs: Names = None,
+    t_end: float = 10.0,
+) -> CCode:
+    """A model in C; arguments as of `Model.to_c`.
+
+    Args:
+        model: the compiled network.
+        name, inputs, outputs: as there.
+        t_end: end of the motion in the example program, s.
+
+    Raises:
+        ParameterError: a name is none, or an input is no law.
+        SignalError: an output does not exist.
+        CompileError: the equations have no code in C.
+    """
+    called = c_name(model.name) if name is None else checked_name(name)
+    values = _input_values(model, as_names(inputs or ()))
+    if values:
+        model = model.with_values(dict.fromkeys(values, RUNNING))
+    _refuse(model, [*values])
+    writer = CodeWriter(model, values, None if outputs is None else as_names(outputs))
+    return CCode(
+        called,
+        *writer.texts(called, t_end),
+        writer.states,
+        writer.parameters,
+        writer.inputs,
+        writer.outputs,
+        writer.stores,
+        tuple(writer.modes.machines) if writer.modes else (),
+        writer.modes.most_guards if writer.modes else 0,
+    )
+
+
+def c_name(title: str) -> str:
+    """A name in C for a title: "crane train 2" is crane_train_2."""
+    plain = re.sub(r"\W+", "_", title, flags=re.ASCII).strip("_")[:LONGEST] or "model"
+    plain = plain if plain[0].isalpha() else f"model_{plain}"[:LONGEST]
+    return f"{plain}_model" if is_taken(plain) else plain
+
+
+def is_taken(name: str) -> bool:
+    """Whether a name stands for something in the code that is the same for all models."""
+    return name in RESERVED or name in runtime_names() or re.fullmatch(r"[a-z]\d+", name) is not None
+
+
+def checked_name(name: Any) -> str:
+    """A name that the user gives.
+
+    Raises:
+        ParameterError: it is no name in C.
+    """
+    if (
+        not isinstance(name, str)
+        or not re.fullmatch(rf"[A-Za-z]\w{{0,{LONGEST - 1}}}", name, re.ASCII)
+        or name in RESERVED
+    ):
+        raise ParameterError(
+            f"name = {name!r} must be a name in C, such as 'crane': at most {LONGEST} letters, digits and _, a letter "
+            "first, and nothing that the code itself is made of. All functions of the code begin with it."
+        )
+    return name
+
+
+def _input_values(model: CompiledNetwork, inputs: Sequence[str]) -> dict[str, float]:
+    """The default value of each input: that of its law at t = 0, or 0 where it depends on more than the time.
+
+    Raises:
+        ParameterError: it is no parameter that may vary with the time.
+    """
+    parts = {part.name: part.component for part in model.form.graph.parts}
+    # the momentum of an inertia that changes would need the rate of its change
+    pairs = ((name, part) for name, part in parts.items() if part.role != "store")
+    laws = [f"{name}.{key}" for name, part in pairs for key, item in part.declared.items() if item.law]
+    values: dict[str, float] = {}
+    for name in inputs:
+        if name not in laws:
+            raise ParameterError(
+                f"inputs: '{name}' is no parameter that may vary with the time. "
+                f"There are: {listed(laws, 12) or 'none'}."
+            )
+        owner, _, key = name.rpartition(".")
+        law = as_expression(getattr(parts[owner], key) or 0.0).subs(TIME, 0)
+        values[name] = float(law) if law.is_number else 0.0
+    return values
+
+
+def _refuse(model: CompiledNetwork, inputs: Sequence[str]) -> None:
+    """Refuse what has no code in C.
+
+    Raises:
+        CompileError: waves, algebraic loops, or an input whose rate would be needed.
+    """
+    form, title = model.form, model.name
+    if form.waves:
+        raise CompileError(f"'{title}' has travelling waves, whose equations need the past. Take model=Spectral(16).")
+    if form.loop_laws:
+        names = listed([form.graph.part_of(k).name for k in form.loop_laws])
+        raise CompileError(f"'{title}' has an algebraic loop through {names}. Give the node of that part an inertia.")
+    rigid = {
+        form.graph.part_of(k).name
+        for link in form.dependent_across
+        for k in form.tree.loops[link]
+        if k in form.across_inputs
+    }
+    for name in inputs:
+        if name.rpartition(".")[0] in rigid:
+            raise CompileError(
+                f"inputs: '{name}' turns an inertia rigidly, which would need its rate as well. Put a spring between "
+                "them, or give a torque."
+            )

@@ -1,0 +1,133 @@
+"""Expressions as statements of C99, with tables and noise."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from sympy import Basic, Expr, Mod, Piecewise, Pow, Symbol, true
+from sympy.printing.codeprinter import PrintMethodNotImplementedError
+
+from shaftwork.codegen.code import shared_parts
+from shaftwork.codegen.looped_source import CPrinter
+from shaftwork.components.noise import HeldNoise, SmoothNoise
+from shaftwork.components.tables import Interpolation, InterpolationSlope, Table
+from shaftwork.core.errors import CompileError
+
+LARGEST_PRODUCT = 4
+"""Powers up to this one of a plain name are products: `pow` takes ten times as long."""
+
+
+class TablePrinter(CPrinter):
+    """C's math functions, tables and noise.
+
+    Args:
+        names: of symbols.
+        tables: by table the number under which its points stand; what is printed adds its own.
+    """
+
+    def __init__(self, names: Mapping[Symbol, str], tables: dict[Table, int]) -> None:
+        super().__init__(names)
+        self.tables = tables
+
+    def _print_Interpolation(self, node: Interpolation) -> str:
+        return f"table({self._table(node)}, {self._print(node.argument)})"
+
+    def _print_InterpolationSlope(self, node: InterpolationSlope) -> str:
+        return f"table_slope({self._table(node)}, {self._print(node.argument)})"
+
+    def _table(self, node: Interpolation | InterpolationSlope) -> str:
+        number = self.tables.setdefault(node.table, len(self.tables))
+        return f"{len(node.xs)}, TABLE_{number}_X, TABLE_{number}_Y"
+
+    def _print_HeldNoise(self, noise: HeldNoise) -> str:
+        return f"held_noise({', '.join(self._print(part) for part in noise.args)})"
+
+    def _print_Mod(self, node: Mod) -> str:
+        number, period = (f"({self._print(part)})" for part in node.args)
+        return f"({number} - {period} * floor({number} / {period}))"  # fmod has the sign of the number
+
+    def _print_Pow(self, power: Pow, *options: Any, **named: Any) -> str:
+        base = self._print(power.base)
+        if power.exp.is_Integer and 2 <= power.exp <= LARGEST_PRODUCT and base.replace("_", "").isalnum():
+            return f"({' * '.join([base] * int(power.exp))})"
+        return super()._print_Pow(power, *options, **named)
+
+    def _print_BooleanTrue(self, _: Basic) -> str:
+        return "1"
+
+    def _print_BooleanFalse(self, _: Basic) -> str:
+        return "0"
+
+    def _print_Piecewise(self, pieces: Piecewise) -> str:
+        text = "NAN"
+        for value, condition in reversed(pieces.args):
+            code = self._print(value)
+            text = code if condition is true else f"({self._print(condition)} ? {code} : {text})"
+        return f"({text})"
+
+
+class Statements:
+    """Writes expressions as assignments, what stands in them more than once first.
+
+    Args:
+        names: C code of every symbol.
+        title: of the network, for messages.
+    """
+
+    def __init__(self, names: Mapping[Symbol, str], title: str) -> None:
+        self._names, self._title = names, title
+        self.tables: dict[Table, int] = {}
+
+    def assigned(self, targets: Sequence[str], expressions: Sequence[Expr]) -> Iterator[str]:
+        """The lines that assign expressions to targets.
+
+        Raises:
+            CompileError: C has no such function.
+        """
+        plain = [_in_pieces(expression) for expression in expressions]
+        printer = TablePrinter(self._names, self.tables)
+        try:
+            for name, code in shared_parts(printer, plain).items():
+                yield f"const double {name} = {code};"
+            for target, expression in zip(targets, plain, strict=True):
+                yield f"{target} = {printer.doprint(expression)};"
+        except PrintMethodNotImplementedError as error:
+            raise CompileError(
+                f"'{self._title}' has a law that C has no function for: {error}. Write it with others, or as a Table."
+            ) from None
+
+
+def _in_pieces(expression: Expr) -> Expr:
+    """With smooth noise in terms of numbers that are held."""
+    noises: dict[Basic, Basic] = {noise: noise.pieces for noise in expression.atoms(SmoothNoise)}
+    return expression.xreplace(noises) if noises else expression
+
+
+def function(head: str, lines: Sequence[str]) -> str:
+    """A static C function; arguments that its lines do not read are marked as unused."""
+    names = [argument.split("*")[-1].split(" ")[-1] for argument in head[head.index("(") + 1 : -1].split(", ")]
+    words = {word for line in lines for word in _words(line)}
+    unused = [f"(void){name};" for name in names if name not in words]
+    return "\n".join([f"static {head}", "{", *(f"    {line}" for line in (*unused, *lines)), "}", ""])
+
+
+def _words(line: str) -> list[str]:
+    return "".join(sign if sign.isalnum() or sign == "_" else " " for sign in line).split()
+
+
+def text_of(value: str) -> str:
+    """A C string literal; signs beyond ASCII are escaped byte by byte."""
+    signs = (chr(byte) if 32 <= byte < 127 and byte not in (34, 92, 63) else f"\\{byte:03o}" for byte in value.encode())
+    return f'"{"".join(signs)}"'
+
+
+def array(kind: str, name: str, values: Sequence[str], width: int = 100) -> str:
+    """A static table of constants, several on a line; at least one, as C knows no empty arrays."""
+    lines, line = list[str](), "   "
+    for value in values or ["0"]:
+        if len(line) + len(value) > width:
+            lines.append(line)
+            line = "   "
+        line += f" {value},"
+    return "\n".join([f"static {kind} {name}[] = {{", *lines, line, "};", ""])

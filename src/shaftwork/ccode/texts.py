@@ -1,0 +1,46 @@
+"""Texts of C code that are the same for all models, and those made of lists."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from functools import cache
+from importlib.resources import files
+
+from shaftwork.ccode.printing import function, text_of
+
+
+def dispatcher(name: str, arguments: Sequence[str], count: int) -> str:
+    """The function that calls that of the set of equations of an instance."""
+    call = ", ".join(("m", "t", *(argument.split("*restrict ")[-1] for argument in arguments)))
+    if count == 1:
+        lines = [f"{name}_0({call});"]
+    else:
+        cases = (f"case {k}: {name}_{k}({call}); break;" for k in range(1, count))
+        lines = ["switch (m->set) {", *cases, f"default: {name}_0({call}); break;", "}"]
+    return function(f"void {name}(const NAME *m, double t, {', '.join(arguments)})", lines)
+
+
+def names_of(kind: str, what: str, texts: Sequence[str]) -> str:
+    """A public list of names or units."""
+    lines = "\n".join(f"    {text_of(text)}," for text in (*texts, ""))
+    return f"const char *const NAME_{kind}_{what}[NAME_{kind.upper()}S + 1] = {{\n{lines}\n}};"
+
+
+def runtime(file: str) -> str:
+    """C code that is the same for all models."""
+    return files(__package__ or "").joinpath("runtime", file).read_text(encoding="utf-8")
+
+
+def filled(text: str, name: str, places: Mapping[str, object]) -> str:
+    """C code with the name of the model and the sizes of its arrays."""
+    text = re.sub(r"@(\w+)@", lambda match: str(places[match[1]]), text)
+    return re.sub(r"\bNAME(?=\b|_)", name, re.sub(r"\bNAME_H\b", f"{name.upper()}_H", text))
+
+
+@cache
+def runtime_names() -> frozenset[str]:
+    """All names and words in the C code that is the same for all models; only asked for membership."""
+    folder = files(__package__ or "").joinpath("runtime")
+    texts = (re.sub(r"/\*.*?\*/", "", file.read_text(encoding="utf-8"), flags=re.DOTALL) for file in folder.iterdir())
+    return frozenset(word for text in texts for word in re.findall(r"[A-Za-z_]\w*", text))

@@ -1,0 +1,227 @@
+"""The texts of the files of a model in C."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+from sympy import Symbol
+
+from shaftwork.ccode.equation_set import CompiledNetwork, EquationSet
+from shaftwork.ccode.instants import Instants
+from shaftwork.ccode.printing import Statements, array
+from shaftwork.ccode.set_functions import ArrayLayout, SetFunctions, stored_symbol
+from shaftwork.ccode.texts import dispatcher, filled, names_of, runtime
+from shaftwork.codegen.state_transfer import StateTransfer
+from shaftwork.components.laws import t as TIME
+from shaftwork.core.errors import SignalError
+from shaftwork.formulation.form import Names
+from shaftwork.network.netlist import listed
+
+if TYPE_CHECKING:
+    from shaftwork.ccode.mode_tables import ModeTables
+
+DISPATCHED = {
+    "rates": ("const double *restrict x", "double *restrict dx"),
+    "jacobian": ("const double *restrict x", "double *restrict slopes"),
+    "outputs": ("const double *restrict x", "double *restrict y"),
+    "stores": ("const double *restrict x", "double *restrict stored"),
+    "take_up": ("const double *restrict stored", "double *restrict x"),
+}
+"""Functions of which each set of equations has its own, and their arguments behind instance and time."""
+
+
+class Variable(NamedTuple):
+    """A number of the C code.
+
+    Args:
+        name: in the network.
+        unit: its unit, in SI.
+        value: the default of a parameter or an input; of other variables 0.
+    """
+
+    name: str
+    unit: str
+    value: float = 0.0
+
+
+class CodeWriter:
+    """Writes the texts of a model.
+
+    Args:
+        model: the compiled network, in which inputs are parameters.
+        inputs: their default values, "part.parameter" to value.
+        wanted: names of the outputs, or None for all quantities.
+    """
+
+    def __init__(self, model: CompiledNetwork, inputs: Mapping[str, float], wanted: Sequence[str] | None) -> None:
+        self._model, self._inputs, self._wanted = model, inputs, wanted
+
+    @cached_property
+    def modes(self) -> ModeTables | None:
+        """What changes its mode; None where nothing does."""
+        if not self._model.phased:
+            return None
+        from shaftwork.ccode.mode_tables import ModeTables
+
+        return ModeTables(self._model)
+
+    @cached_property
+    def sets(self) -> tuple[EquationSet, ...]:
+        """The sets of equations; of one that contradicts itself the first stands in its place."""
+        return (EquationSet(self._model),) if self.modes is None else self.modes.sets
+
+    @cached_property
+    def parameters(self) -> tuple[Variable, ...]:
+        """The parameters of all sets, but for inputs and the numbers of modes."""
+        besides = {*self._inputs, *(self.modes.numbers if self.modes else ())}  # only asked for membership
+        values: dict[str, float] = {}
+        for one in self.sets:
+            values |= {k: v for k, v in one.form.graph.parameters.items() if k not in besides and k not in values}
+        return tuple(Variable(name, self._unit(name), value) for name, value in values.items())
+
+    @cached_property
+    def inputs(self) -> tuple[Variable, ...]:
+        """The inputs."""
+        return tuple(Variable(name, self._unit(name), value) for name, value in self._inputs.items())
+
+    def _unit(self, name: str) -> str:
+        owner, _, parameter = name.rpartition(".")
+        part = next(part for part in self._model.form.graph.parts if part.name == owner)
+        declared = part.component.declared.get(parameter)
+        return declared.unit if declared else "1"
+
+    @cached_property
+    def states(self) -> tuple[Variable, ...]:
+        """The states of all sets."""
+        units = {state.name: state.unit for one in self.sets for state in one.form.states}
+        return tuple(Variable(name, unit) for name, unit in units.items())
+
+    @cached_property
+    def stores(self) -> tuple[str, ...]:
+        """Names of all that is stored."""
+        return StateTransfer(self.sets[0].form).names
+
+    @cached_property
+    def outputs(self) -> tuple[Variable, ...]:
+        """The outputs that are wanted; by default all quantities that every set of equations tells.
+
+        Raises:
+            SignalError: there is no such quantity, or some phase does not tell it.
+        """
+        units = Names(self.sets[0].form).units
+        names = [name for name in units if not name.endswith((".power", ".energy"))]
+        told = [name for name in names if all(one.observables.quantity(name) is not None for one in self.sets)]
+        wanted = told if self._wanted is None else self._wanted
+        for name in wanted:
+            if name not in told:
+                why = "is an energy, a power or told in some phases alone" if name in units else "does not exist"
+                raise SignalError(f"outputs: '{name}' {why}. There are: {listed(told, 12)}.")
+        return tuple(Variable(name, units[name]) for name in wanted)
+
+    @cached_property
+    def _names(self) -> dict[Symbol, str]:
+        """The code of every symbol."""
+        names = {TIME: "t"}
+        for letter, variables in (("m->p", self.parameters), ("m->u", self.inputs), ("x", self.states)):
+            names |= {Symbol(v.name, real=True): f"{letter}[{k}]" for k, v in enumerate(variables)}
+        names |= {stored_symbol(name): f"stored[{k}]" for k, name in enumerate(self.stores)}
+        numbers = self.modes.numbers if self.modes else ()
+        return names | {Symbol(name, real=True): f"m->number[{k}]" for k, name in enumerate(numbers)}
+
+    def texts(self, name: str, t_end: float) -> tuple[str, str, str]:
+        """Header, source and example under a name; the end of the example's motion in s."""
+        modes = self.modes
+        sizes = {"STATES": len(self.states), "STORES": len(self.stores), "PARAMETERS": len(self.parameters)}
+        sizes |= {"INPUTS": len(self.inputs), "OUTPUTS": len(self.outputs)}
+        sizes |= {"MACHINES": len(modes.machines) if modes else 0, "GUARDS": modes.most_guards if modes else 0}
+        places = {**sizes, "TITLE": self._model.name.replace("/", "|"), "T_END": repr(float(t_end))}
+        whole = (runtime("header.h"), self._source, runtime("main.c"))
+        header, source, example = (filled(text, name, places) for text in whole)
+        return header, source, example
+
+    @cached_property
+    def _source(self) -> str:
+        modes, statements = self.modes, Statements(self._names, self._model.name)
+        names = (tuple(v.name for v in some) for some in (self.states, self.outputs))
+        states, outputs = names
+        layout = ArrayLayout(states, self.stores, outputs, statements)
+        functions = [SetFunctions(number, one, layout) for number, one in enumerate(self.sets)]
+        still = [symbol for symbol, code in self._names.items() if code.startswith(("m->p", "m->u"))]
+        body = [one.text for one in functions]
+        body += [dispatcher(name, arguments, len(functions)) for name, arguments in DISPATCHED.items()]
+        body += modes.texts(functions, statements) if modes else [_NO_GUARDS]
+        body.append(Instants(self._model.form.graph, still).text(statements))
+        text = "\n".join(body)
+        tables = [
+            array("const double", f"TABLE_{k}_{axis}", [*map(repr, points)])
+            for table, k in statements.tables.items()
+            for axis, points in (("X", table.xs), ("Y", table.ys))
+        ]
+        calls = {"points.c": "table", "table.c": "table(", "table_slope.c": "table_slope(", "noise.c": "held_noise("}
+        helpers = ["numbers.c"] * (modes is not None or "solve(" in text)
+        helpers += [file for file, call in calls.items() if call in text]
+        return "\n".join(
+            [
+                runtime("head.c"),
+                self._nominal,
+                *tables,
+                *map(runtime, helpers),
+                text,
+                runtime("dop853.c"),
+                *map(
+                    runtime,
+                    (
+                        "solver.c",
+                        "jumps.c",
+                        *(("events.c", "impacts.c", "iteration.c") if modes else ("smooth.c",)),
+                        "common.c",
+                    ),
+                ),
+                *(modes.names if modes else [_NO_MODES]),
+                self._init,
+            ]
+        )
+
+    @property
+    def _nominal(self) -> str:
+        nominal: dict[str, float] = {}
+        for one in self.sets:
+            nominal = {**one.nominal, **nominal}
+        return array("const double", "NOMINAL", [repr(nominal[variable.name]) for variable in self.states])
+
+    @property
+    def _init(self) -> str:
+        """Names and units, and the function that puts default values in."""
+        lists = {"state": self.states, "parameter": self.parameters, "input": self.inputs, "output": self.outputs}
+        texts = [names_of("store", "names", self.stores)]
+        texts.append(names_of("machine", "names", self.modes.machines if self.modes else ()))
+        for kind, variables in lists.items():
+            texts.append(names_of(kind, "names", [variable.name for variable in variables]))
+            texts.append(names_of(kind, "units", [variable.unit for variable in variables]))
+        lines = [f"    m->p[{k}] = {variable.value!r};" for k, variable in enumerate(self.parameters)]
+        lines += [f"    m->u[{k}] = {variable.value!r};" for k, variable in enumerate(self.inputs)]
+        return "\n".join([*texts, _INIT, *lines, "    (void)NAME_start(m, 0.0);", "}", ""])
+
+
+_INIT = """void NAME_init(NAME *m)
+{
+    memset(m, 0, sizeof *m);
+    m->look_ahead = 1e-6;
+    m->most_steps = 1000000;"""
+_NO_GUARDS = """static void guards(const NAME *m, double t, const double *x, double *g)
+{
+    (void)m;
+    (void)t;
+    (void)x;
+    g[0] = -1.0;
+}
+"""
+_NO_MODES = """const char *NAME_mode_name(int machine, int mode)
+{
+    (void)machine;
+    (void)mode;
+    return "";
+}
+"""

@@ -1,0 +1,102 @@
+"""The command that writes a network for others: `shaftwork export`."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from shaftwork.cli.command import FALLBACK_END, Data, Say, command, load
+from shaftwork.core.errors import ParameterError
+
+if TYPE_CHECKING:
+    from shaftwork.pipeline.network import Network
+
+
+class Export(NamedTuple):
+    """A format of another tool.
+
+    Args:
+        option: of the command line, without dashes.
+        place: what it takes, for the help.
+        text: the help.
+        write: writes a network into a place with inputs, outputs and the end of an example in s; returns the paths.
+    """
+
+    option: str
+    place: str
+    text: str
+    write: Callable[[Network, str, list[str], list[str] | None, float], Iterable[Path]]
+
+
+def _c(net: Network, place: str, inputs: list[str], outputs: list[str] | None, t_end: float) -> Iterable[Path]:
+    from shaftwork.ccode.export import c_code
+
+    return c_code(net.compile(), inputs=inputs, outputs=outputs, t_end=t_end).write(place)
+
+
+EXPORTS = (Export("c", "DIR", "C code in a folder: equations, modes, events, integrators and an example", _c),)
+"""The formats beside model files."""
+
+
+def export_options(parser: ArgumentParser) -> None:
+    """The options of `shaftwork export`."""
+    parser.add_argument("file", metavar="NEW.toml", nargs="?", help="file to write (default: the screen)")
+    for export in EXPORTS:
+        parser.add_argument(f"--{export.option}", metavar=export.place, help=export.text)
+    parser.add_argument(
+        "--input",
+        metavar="PART.PARAMETER",
+        action="append",
+        default=[],
+        help="what the other program sets as it runs, in place of its law: motor.tau; as often as needed",
+    )
+    parser.add_argument(
+        "--output", metavar="NAME", action="append", help="a quantity that it tells (default: all); as often as needed"
+    )
+
+
+@command("the model file of a scene, to change and run; or C code", export_options)
+def export(options: Namespace, say: Say) -> Data:
+    """The model file of a scene, or of another model file with other values; or the same for other tools."""
+    chosen = [one for one in EXPORTS if getattr(options, one.option) is not None]
+    if not chosen:
+        _refuse_without(options)
+        return _model_file(options, say)
+    if options.file is not None:
+        raise ParameterError(f"'{options.file}' and --{chosen[0].option} both name a place to write to. Leave out one.")
+    net, scene = load(options)
+    for one in chosen:
+        end = scene.t_end if scene else FALLBACK_END
+        for path in one.write(net, getattr(options, one.option), options.input, options.output, end):
+            say(f"written: {path}")
+    return {}
+
+
+def _refuse_without(options: Namespace) -> None:
+    if options.input or options.output:
+        names = " or ".join(f"--{one.option}" for one in EXPORTS)
+        raise ParameterError(f"A model file has no --input and --output. Add {names}, or leave them out.")
+
+
+def _model_file(options: Namespace, say: Say) -> Data:
+    from shaftwork.modelfiles.storage import netlist_text
+
+    net, scene = load(options)
+    if options.file is None:
+        say(netlist_text(net.netlist()).rstrip("\n"))
+    else:
+        path = Path(options.file)
+        if path.suffix != ".toml":
+            raise ParameterError(f"'{path}' must end in .toml, so that the other commands take it for a model file.")
+        if path.exists():
+            raise ParameterError(f"'{path}' exists already. Give another name, or delete it.")
+        net.save(path)
+        say(f"written: {path}")
+    if scene:
+        line = shlex.join(["shaftwork", "run", options.file or "FILE.toml", "--t-end", f"{scene.t_end:g}"])
+        print(f"A model file has no end time. For the motion of the scene: {line}", file=sys.stderr)
+    return {}

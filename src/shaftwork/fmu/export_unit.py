@@ -1,0 +1,224 @@
+"""A compiled model as an FMU: C code with the functions of FMI around it, its description and a binary."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import zipfile
+from collections.abc import Iterable, Mapping, Sequence
+from importlib.resources import files
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+from shaftwork.ccode.equation_set import EquationSet
+from shaftwork.ccode.export import RUNNING, CCode, c_code
+from shaftwork.core.errors import CompileError, ParameterError
+from shaftwork.core.files import in_a_folder
+from shaftwork.core.parameters import in_si
+from shaftwork.fmu.unit_description import KINDS, build_description, model_description
+from shaftwork.fmu.unit_interface import UnitInterface, UnitVariable
+
+if TYPE_CHECKING:
+    from shaftwork.pipeline.model import Model
+
+VERSIONS = ("3.0", "2.0")
+_KINDS = {"both": KINDS, "model exchange": KINDS[:1], "co-simulation": KINDS[1:]}
+_SYSTEMS = {"Linux": "linux", "Darwin": "darwin", "Windows": "windows"}
+_MACHINES = {"amd64": "x86_64", "arm64": "aarch64", "i686": "x86"}
+_EXTENSIONS = {"Linux": ".so", "Darwin": ".dylib", "Windows": ".dll"}
+_DAY = (1980, 1, 1, 0, 0, 0)  # of all files in the archive: the same network gives the same bytes
+
+
+def export_unit(
+    model: Model,
+    path: str | Path,
+    version: str,
+    kind: str,
+    inputs: Sequence[str],
+    outputs: Sequence[str] | None,
+    t_end: float,
+    *,
+    binary: bool,
+) -> Path:
+    """Write an FMU; arguments and errors as of `Model.to_fmu`."""
+    place = in_a_folder(path)
+    if version not in VERSIONS:
+        raise ParameterError(f"version = {version!r} of FMI is none of: {', '.join(VERSIONS)}.")
+    if kind not in _KINDS:
+        raise ParameterError(f"kind = {kind!r} of an FMU is none of: {', '.join(map(repr, _KINDS))}.")
+    code = _code(model, inputs, outputs)
+    end = in_si("t_end", t_end, "s", above=0)
+    unit = _interface(model.name, code, outputs, _dependencies(model, code), end)
+    texts = _sources(unit, code, version)
+    compiled = tuple(name for name in texts if name.endswith(".c"))
+    members = {"modelDescription.xml": model_description(unit, version, _KINDS[kind], compiled)}
+    members |= {f"sources/{name}": text.encode() for name, text in texts.items()}
+    if version == "3.0":
+        members["sources/buildDescription.xml"] = build_description(code.name, compiled)
+    if binary:
+        members |= _binary(code.name, texts, version)
+    _write(place, members)
+    return place
+
+
+def _code(model: Model, inputs: Sequence[str], outputs: Sequence[str] | None) -> CCode:
+    """The C code; states are read in any case, and what is stored and no state in any mode is an output like others."""
+    if outputs is None:
+        return c_code(model, inputs=inputs)
+    if isinstance(outputs, str):
+        raise ParameterError(f"outputs = {outputs!r} must be a list of names, such as [{outputs!r}].")
+    code = c_code(model, inputs=inputs, outputs=[name for name in outputs if name not in model.states])
+    states = {variable.name for variable in code.states}  # only asked for membership
+    if states >= {name for name in outputs if name in model.states}:
+        return code
+    return c_code(model, inputs=inputs, outputs=[name for name in outputs if name not in states])
+
+
+def _dependencies(model: Model, code: CCode) -> dict[str, tuple[str, ...]]:
+    """The states and inputs in each rate and output; of a network whose modes change them nothing is told."""
+    if model.phased:
+        return {}
+    inputs = dict.fromkeys((variable.name for variable in code.inputs), RUNNING)
+    equations = EquationSet(model.with_values(inputs) if inputs else model)
+    rates = {state.name: rate for state, rate in zip(equations.rows.states, equations.rows.rates, strict=True)}
+    laws = {f"der({name})": rate for name, rate in rates.items()}
+    laws |= {variable.name: equations.observables.quantity(variable.name) for variable in code.outputs}
+    moving = (*rates, *inputs)
+    read = {
+        name: {symbol.name for symbol in law.free_symbols} for name, law in laws.items()
+    }  # only asked for membership
+    return {name: tuple(other for other in moving if other in symbols) for name, symbols in read.items()}
+
+
+def _interface(
+    title: str,
+    code: CCode,
+    outputs: Sequence[str] | None,
+    dependencies: Mapping[str, tuple[str, ...]],
+    t_end: float,
+) -> UnitInterface:
+    """What the unit shows: states that are outputs as well, and other outputs."""
+    states = {variable.name for variable in code.states}  # only asked for membership
+    others = states | {variable.name for variable in (*code.inputs, *code.parameters)}
+    wanted = tuple(variable.name for variable in code.outputs) if outputs is None else tuple(outputs)
+    token = hashlib.sha256(f"{code.header}\0{code.source}".encode()).hexdigest()
+    return UnitInterface(
+        title=title,
+        identifier=code.name,
+        token="{" + "-".join((token[:8], token[8:12], token[12:16], token[16:20], token[20:32])) + "}",
+        parameters=_with_values(code.parameters),
+        inputs=_with_values(code.inputs),
+        states=tuple(UnitVariable(v.name, v.unit, 0.0) for v in code.states),
+        outputs=tuple(UnitVariable(v.name, v.unit) for v in code.outputs if v.name not in others),
+        shown=frozenset(states & {*wanted}),
+        indicators=code.guards,
+        dependencies=dependencies,
+        t_end=t_end,
+    )
+
+
+def _with_values(variables: Iterable[object]) -> tuple[UnitVariable, ...]:
+    return tuple(UnitVariable(v.name, v.unit, v.value) for v in variables)  # type: ignore[attr-defined]
+
+
+def _sources(unit: UnitInterface, code: CCode, version: str) -> dict[str, str]:
+    """The files of source code by name."""
+    folder = files("shaftwork.fmu") / "sources"
+    layer = f"fmi{version[0]}.c"
+    texts = {f"{code.name}.c": code.source}
+    texts |= {name: (folder / name).read_text(encoding="utf-8") for name in ("unit.c", layer, "unit.h")}
+    return {**texts, f"{code.name}.h": code.header, "unit_config.h": _configuration(unit, code)}
+
+
+def _configuration(unit: UnitInterface, code: CCode) -> str:
+    """The header that tells the same code for all models which one this is."""
+    places = {variable.name: k for k, variable in enumerate(code.outputs)}
+    sizes = {
+        "PARAMETERS": len(unit.parameters),
+        "INPUTS": len(unit.inputs),
+        "STATES": len(unit.states),
+        "OUTPUTS": len(unit.outputs),
+        "ALL_OUTPUTS": len(code.outputs),
+        "INDICATORS": unit.indicators,
+    }
+    stores = [code.stores.index(variable.name) for variable in code.states]
+    lines = [
+        "/* Which model this unit is. */",
+        f'#include "{code.name}.h"',
+        "",
+        f"typedef {code.name} Model;",
+        f"#define MODEL(function) {code.name}_##function",
+        f'#define UNIT_NAME "{code.name}"',
+        f'#define UNIT_TOKEN "{unit.token}"',
+        *(f"#define UNIT_{name} {size}" for name, size in sizes.items()),
+        _listed("UNIT_STORES_OF_STATES", stores, "of each state its place among the start values"),
+        _listed(
+            "UNIT_PLACES_OF_OUTPUTS", [places[v.name] for v in unit.outputs], "of each output among those of the model"
+        ),
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _listed(name: str, numbers: Sequence[int], meaning: str) -> str:
+    return f"#define {name} {{{', '.join(map(str, numbers)) or '0'}}} /* {meaning} */"
+
+
+def _binary(name: str, texts: Mapping[str, str], version: str) -> dict[str, bytes]:
+    """The shared library for this machine, by its path in the archive.
+
+    Raises:
+        CompileError: there is no C compiler, or it fails.
+    """
+    compiler = os.environ.get("CC") or next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
+    if compiler is None:
+        raise CompileError(
+            "model.to_fmu() found no C compiler for the binary of this machine. Install gcc or clang, set CC, or give "
+            "binary=False for an FMU of source code, which the importing tool compiles."
+        )
+    system = platform.system()
+    library = name + _EXTENSIONS.get(system, ".so")
+    with TemporaryDirectory(prefix="shaftwork-fmu-") as folder:
+        for file, text in texts.items():
+            (Path(folder) / file).write_text(text, encoding="utf-8")
+        sources = [file for file in texts if file.endswith(".c")]
+        options = ["-std=c99", "-O2", "-shared", "-fPIC", "-fvisibility=hidden", "-s"]
+        options.append("-Werror=implicit-function-declaration")  # else what is missing shows where the unit is loaded
+        done = subprocess.run(  # noqa: S603 (the compiler of this machine, on code made here)
+            [compiler, *options, "-o", library, *sources, "-lm"],
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if done.returncode != 0:
+            raise CompileError(f"The C compiler {compiler} failed on the code of '{name}': {done.stderr.strip()[:500]}")
+        return {f"binaries/{_platform(version)}/{library}": (Path(folder) / library).read_bytes()}
+
+
+def _platform(version: str) -> str:
+    """The name that FMI has for this machine."""
+    system, machine = platform.system(), platform.machine().lower()
+    if version == "2.0":
+        short = {"Windows": "win"}.get(system, _SYSTEMS.get(system, "linux"))
+        return f"{short}{64 if sys.maxsize > 2**32 else 32}"
+    return f"{_MACHINES.get(machine, machine)}-{_SYSTEMS.get(system, 'linux')}"
+
+
+def _write(place: Path, members: Mapping[str, bytes]) -> None:
+    """Write the archive, which takes the place of one that was there once it is whole."""
+    draft = place.with_name(f".{place.name[:50]}.{os.getpid()}.part")
+    try:
+        with zipfile.ZipFile(draft, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name, data in members.items():
+                member = zipfile.ZipInfo(name, _DAY)
+                member.external_attr = 0o644 << 16
+                archive.writestr(member, data, zipfile.ZIP_DEFLATED)
+        draft.replace(place)
+    finally:
+        draft.unlink(missing_ok=True)

@@ -1,0 +1,255 @@
+"""An FMU of another tool, loaded through FMPy and evaluated as a function of time, its states and its input."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import threading
+import weakref
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from tempfile import mkdtemp
+from types import MappingProxyType
+from typing import Any, Self
+
+import numpy as np
+
+from shaftwork.core.errors import ParameterError, SimulationError, imported
+
+MOST_STATES = 256
+"""Continuous states that an FMU in a network may have: each is a state of the network."""
+_NUMBERS = ("Real", "Float64")
+
+
+@dataclass(frozen=True)
+class FMU:
+    """A functional mock-up unit: a file for model exchange, FMI 2.0 or 3.0, that stands in a network as a part.
+
+    Its binary is loaded and runs in this process, so take files of people you trust.
+
+    Args:
+        path: of the file.
+        speed: name of its variable for the speed of the node, rad/s.
+        torque: name of its variable for the torque on the node, N m.
+        start: values of its parameters and of its other inputs, by name.
+
+    Raises:
+        MissingExtraError: FMPy is not installed.
+        ParameterError: the file cannot be read, has no such variable, or holds what a right-hand side cannot.
+    """
+
+    path: Path
+    speed: str
+    torque: str
+    start: Mapping[str, float] = field(default_factory=dict, hash=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "path", Path(self.path).resolve())
+        object.__setattr__(self, "start", MappingProxyType(dict(self.start)))
+        self._refuse_unfit()
+        for name, value in self.start.items():
+            self._variable(name, ("parameter", "input"), "start")
+            if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+                raise ParameterError(f"FMU '{self.path.name}': start['{name}'] = {value!r} must be a finite number.")
+        for name, what in ((self.speed, "speed"), (self.torque, "torque")):
+            self._variable(name, ("input", "output"), what)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return FMU, (self.path, self.speed, self.torque, dict(self.start))
+
+    def __repr__(self) -> str:
+        return f"FMU({str(self.path)!r}, speed={self.speed!r}, torque={self.torque!r}, start={dict(self.start)!r})"
+
+    @classmethod
+    def read(cls, _text: object) -> Self:
+        """No text stands for an FMU: its binary would run because a model file says so.
+
+        Args:
+            _text: anything.
+
+        Raises:
+            ParameterError: always.
+        """
+        raise ParameterError(
+            "an FMU is a program that would run in this process, and no text in a file may ask for that. Build the "
+            "part in a script, with fmu=sw.FMU('file.fmu', speed=..., torque=...)"
+        )
+
+    @cached_property
+    def description(self) -> Any:
+        """FMPy's reading of its modelDescription.xml."""
+        fmpy = imported("fmpy", "fmi", "sw.FMU")
+        try:
+            return fmpy.read_model_description(str(self.path))
+        except Exception as error:  # noqa: BLE001 (FMPy raises whatever its XML and ZIP readers do)
+            reason = " ".join(str(error).split())[:300]
+            raise ParameterError(f"'{self.path}' is no FMU that can be read: {reason}") from None
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of its continuous states."""
+        return tuple(unknown.variable.derivative.name for unknown in self.description.derivatives)
+
+    def _variable(self, name: str, causalities: tuple[str, ...], what: str) -> Any:
+        fitting = [v for v in self.description.modelVariables if v.causality in causalities and v.type in _NUMBERS]
+        for variable in fitting:
+            if variable.name == name:
+                return variable
+        names = ", ".join(v.name for v in fitting[:20]) or "none"
+        raise ParameterError(
+            f"FMU '{self.path.name}': {what} names '{name}', which is no {' or '.join(causalities)} that is a number. "
+            f"It has: {names}."
+        )
+
+    def _refuse_unfit(self) -> None:
+        """Refuse what a right-hand side cannot evaluate."""
+        unit = self.description
+        events = int(unit.numberOfEventIndicators or 0)
+        reason = ""
+        if not str(unit.fmiVersion).startswith(("2.", "3.")):
+            reason = f"is of FMI {unit.fmiVersion}; export it as FMI 2.0 or 3.0"
+        elif unit.modelExchange is None:
+            reason = (
+                "is for co-simulation alone: it keeps its states to itself, and a right-hand side cannot ask it. "
+                "Export it for model exchange, or step it beside a run of model.start(...)"
+            )
+        elif events:
+            reason = (
+                f"has {events} event indicators: it changes its equations by itself, which a part of a network may "
+                "not. Export it without events, or for co-simulation, and step it beside a run of model.start(...)"
+            )
+        elif len(unit.derivatives) > MOST_STATES:
+            reason = f"has {len(unit.derivatives)} states; at most {MOST_STATES} can be states of a network"
+        elif any(unknown.variable.shape for unknown in unit.derivatives):
+            reason = "has arrays as states; export it with scalars"
+        if reason:
+            raise ParameterError(f"FMU '{self.path.name}' {reason}.")
+
+    def gives(self, name: str) -> bool:
+        """Whether a variable is one of its outputs."""
+        return any(v.name == name and v.causality == "output" for v in self.description.modelVariables)
+
+    def feeds_through(self, output: str) -> bool:
+        """Whether an output depends on an input at once; true where its author does not say."""
+        for unknown in self.description.outputs:
+            if unknown.variable.name == output:
+                dependencies = unknown.dependencies
+                return dependencies is None or any(v.causality == "input" for v in dependencies)
+        return True
+
+
+class ForeignUnit:
+    """One instance of an FMU as a pure function: time, states and input to the rates of the states and the output.
+
+    The states are counted from those that it starts with, as all that a network stores is zero at rest.
+
+    Args:
+        fmu: the file with its values.
+        input_name: of the variable that is set.
+        output_name: of the variable that is read.
+    """
+
+    def __init__(self, fmu: FMU, input_name: str, output_name: str) -> None:
+        self._fmu, self._input, self._output = fmu, input_name, output_name
+        self.key = f"{fmu} of {fmu.path.stat().st_mtime_ns}, {output_name} by {input_name}"
+        self._lock = threading.Lock()
+        self._last: tuple[tuple[float, ...], list[float]] = ((), [])
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return ForeignUnit, (self._fmu, self._input, self._output)
+
+    def value(self, row: int, arguments: tuple[float, ...]) -> float:
+        """The rate of state `row`, or the output behind the last one.
+
+        Args:
+            row: number of the state.
+            arguments: time in s, states, and the input.
+
+        Raises:
+            SimulationError: the FMU refuses to evaluate there.
+        """
+        with self._lock:
+            if arguments != self._last[0]:
+                self._last = arguments, self._evaluated(*arguments)
+            return self._last[1][row]
+
+    def _evaluated(self, t: float, *numbers: float) -> list[float]:
+        try:
+            return self._instance.evaluated(t, np.array(numbers[:-1]), numbers[-1])
+        except SimulationError:
+            raise
+        except Exception as error:  # noqa: BLE001 (FMPy raises plain exceptions)
+            reason = " ".join(str(error).split())[:300]
+            raise SimulationError(
+                f"The FMU '{self._fmu.path.name}' failed at t = {t:.9g} s, {self._input} = {numbers[-1]:.9g}: {reason}"
+            ) from None
+
+    @cached_property
+    def _instance(self) -> _Instance:
+        return _Instance(self._fmu, self._input, self._output)
+
+
+class _Instance:
+    """A loaded binary in its continuous-time mode.
+
+    Args:
+        fmu: the file with its values.
+        input_name: of the variable that is set.
+        output_name: of the variable that is read.
+    """
+
+    def __init__(self, fmu: FMU, input_name: str, output_name: str) -> None:
+        fmpy, simulation = (imported(name, "fmi", "sw.FMU") for name in ("fmpy", "fmpy.simulation"))
+        description = fmu.description
+        folder = mkdtemp(prefix="shaftwork-fmu-")
+        weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+        fmpy.extract(str(fmu.path), unzipdir=folder)
+        self._unit = simulation.instantiate_fmu(folder, description, fmi_type="ModelExchange")
+        references = {v.name: v.valueReference for v in description.modelVariables}
+        self._input, self._output = [references[input_name]], [references[output_name]]
+        newer = str(description.fmiVersion).startswith("3.")
+        kind, rates = ("Float64", "getContinuousStateDerivatives") if newer else ("Real", "getDerivatives")
+        self._set, self._get = getattr(self._unit, f"set{kind}"), getattr(self._unit, f"get{kind}")
+        self._rates = getattr(self._unit, rates)
+        self._size = len(description.derivatives)
+        if not newer:
+            self._unit.setupExperiment(startTime=0.0)
+        start = [[references[name]] for name in fmu.start], list(fmu.start.values())
+        for reference, value in zip(*start, strict=True):
+            self._set(reference, [value])
+        self._unit.enterInitializationMode()
+        self._unit.exitInitializationMode()
+        update = self._unit.updateDiscreteStates if newer else self._unit.newDiscreteStates
+        needed = next_event = True
+        while needed:
+            needed, _, _, _, next_event, when = update()
+        if next_event:
+            raise SimulationError(
+                f"The FMU '{fmu.path.name}' announces an event at t = {when:.9g} s, and a part of a network may have "
+                "none. Export it for co-simulation and step it beside a run of model.start(...)."
+            )
+        self._unit.enterContinuousTimeMode()
+        self._start = self._states(self._unit.getContinuousStates)
+
+    def _states(self, read: Any) -> np.ndarray[Any, Any]:
+        values = np.empty(self._size)
+        if self._size:
+            read(_pointer(values), self._size)
+        return values
+
+    def evaluated(self, t: float, deviations: np.ndarray[Any, Any], value: float) -> list[float]:
+        """Rates of the states and the output, at a time in s, states less those of the start, and an input."""
+        states = self._start + deviations
+        self._unit.setTime(t)
+        if self._size:
+            self._unit.setContinuousStates(_pointer(states), self._size)
+        self._set(self._input, [value])
+        return [*self._states(self._rates).tolist(), *map(float, self._get(self._output))]
+
+
+def _pointer(values: np.ndarray[Any, Any]) -> Any:
+    from ctypes import POINTER, c_double
+
+    return values.ctypes.data_as(POINTER(c_double))
