@@ -9,7 +9,7 @@ import pytest
 import sympy
 
 import shaftwork as sw
-from shaftwork.pipeline.steady_start import steady_start
+from shaftwork.pipeline.settled import steady_start
 
 WHEEL = sw.Table([0.0, 2.0, 20.0, 30.0, 40.0], [0.0, 0.8e6, 0.8e6, 0.7e6, 0.7e6])
 

@@ -64,7 +64,7 @@ def tors_elements(system: Any) -> tuple[str, tuple[Element, ...]]:
     components = {_text(component, "name", "a component"): component for component in system["components"]}
     if len(components) < len(system["components"]):
         raise ModelFileError("Two components have one name. Give each its own.")
-    return name, tuple(_Reading(components, _connections(system, components)).elements())
+    return name, tuple(_TableReading(components, _connections(system, components)).elements())
 
 
 def _connections(system: Mapping[str, Any], components: Mapping[str, Any]) -> dict[tuple[str, str], list[str]]:
@@ -84,7 +84,7 @@ def _connections(system: Mapping[str, Any], components: Mapping[str, Any]) -> di
 
 
 @dataclass
-class _Reading:
+class _TableReading:
     """The way through the components of a file, from the one that follows none."""
 
     components: Mapping[str, Any]

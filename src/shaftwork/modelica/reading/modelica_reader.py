@@ -131,7 +131,7 @@ def _names_of(one: ClassText, outer: tuple[ClassText, ...]) -> tuple[str, str]:
 
 
 @dataclass
-class _Instance:
+class _ModelInstance:
     """A part of the file."""
 
     declaration: Declaration
@@ -152,7 +152,7 @@ class _Reading:
         self._values = ModelicaValues(terms)
         self._nodes, self._places = JoinedTerminals(), JoinedTerminals()
         self._signals: dict[str, Any] = {}
-        self._instances: dict[str, _Instance] = {}
+        self._instances: dict[str, _ModelInstance] = {}
         names = [declaration.name for declaration in text.declarations]
         other = Identifiers(names).unused("frame")
         self._names = {**{name: name for name in names}, REFERENCE: other}  # which no part can be called
@@ -208,7 +208,7 @@ class _Reading:
         elif full in CLASSES:
             entry = CLASSES[full]
             values, starts = self._modifiers(declaration, entry.values)
-            self._instances[name] = _Instance(declaration, entry, values, starts)
+            self._instances[name] = _ModelInstance(declaration, entry, values, starts)
             for other in entry.rigid[1:]:
                 self._nodes.join(f"{name}.{entry.rigid[0]}", f"{name}.{other}")
         else:
@@ -301,7 +301,7 @@ class _Reading:
 
     # parts
 
-    def _placed(self, name: str, instance: _Instance, frame: frozenset[str]) -> list[Placed]:
+    def _placed(self, name: str, instance: _ModelInstance, frame: frozenset[str]) -> list[Placed]:
         """The parts of an instance at their nodes."""
         line, entry = instance.declaration.line, instance.entry
         if (signal := self._inputs.get(f"{name}.{entry.signal}")) is not None:
@@ -354,7 +354,7 @@ class _Reading:
                     initial[f"{name}.{letter}{relative}"] = twist
         return initial
 
-    def _twist(self, name: str, instance: _Instance, positions: Mapping[str, float]) -> float:
+    def _twist(self, name: str, instance: _ModelInstance, positions: Mapping[str, float]) -> float:
         """The twist of a against b beyond the relaxed one."""
         relaxed = instance.values.get("phi_rel0", instance.values.get("s_rel0", 0.0))
         for key in ("phi_rel", "s_rel"):
