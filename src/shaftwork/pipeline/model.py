@@ -161,11 +161,11 @@ class Model(ExportedModel):
         again = Repetition(self._rebuild, self.netlist, demand, taken, values, initial, self)
         return replace(motion, parameters=parameters, initial=dict(initial or {}), rtol=demand.rtol, again=again)
 
-    def start(self, **options: Any) -> Simulation:
+    def start(self, inputs: Names = None, **options: Any) -> Simulation:
         """A motion that is stepped from outside, with inputs set between the steps; options as of `Simulation`."""
         from shaftwork.stepper.simulation import Simulation
 
-        return Simulation(self, **options)
+        return Simulation(self, inputs=inputs, **options)
 
     def _start(
         self, initial: Mapping[str, float] | Solution | None, t_start: float | None
