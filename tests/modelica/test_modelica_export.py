@@ -183,7 +183,36 @@ def test_a_gap_moves_alike_by_its_equations_and_shows_its_torque() -> None:
     assert deviation(net, {"gap.tau": "gap_tau"}, 2.0, text=text) < 1e-4
 
 
-@pytest.mark.parametrize("noise", [sw.HeldNoise(sw.t / 0.05, 1), sw.SmoothNoise(sw.t / 0.2, -2.5)])
+def pendulum() -> sw.Network:
+    net = sw.Network("pendulum")
+    net.add(sw.Inertia("J", J=2 + sympy.cos(sw.phi)), "a")
+    net.add(sw.TorqueSource("weight", tau=-5 * sympy.sin(sw.phi) + sw.Table([0, 0.5, 1], [0, 3, 1])(sw.t)), "a")
+    net.add(sw.Spring("shaft", c=10 + 50 * sw.phi**2, d=0.1), "a", "b")
+    net.add(sw.Inertia("J2", J=2.0), "b")
+    return net
+
+
+def in_series() -> sw.Network:
+    net = sw.Network("in series")
+    net.add(sw.SpeedSource("drive", omega=sw.Ramp(5.0, 0.5)), "a")
+    net.add(sw.Spring("one", c=100.0, d=1.0), "a", "b")
+    net.add(sw.Spring("other", c=50.0, d=2.0), "b", "c")
+    net.add(sw.Inertia("J2", J=2.0), "c")
+    return net
+
+
+@pytest.mark.parametrize("form", ["component", "flat"])
+@pytest.mark.parametrize("build", [pendulum, in_series])
+def test_laws_of_angles_and_tables_and_nodes_without_mass_move_alike(build: object, form: str) -> None:
+    net = build()  # type: ignore[operator]
+    text = net.to_modelica(form=form, library="inline")
+    pairs = {"J2.omega": "J2_omega" if form == "flat" else "J2.w"}
+    assert deviation(net, pairs, 1.0, text=text) < AGREES
+
+
+@pytest.mark.parametrize(
+    "noise", [sw.HeldNoise(sw.t / 0.05, 1), pytest.param(sw.SmoothNoise(sw.t / 0.2, -2.5), marks=pytest.mark.slow)]
+)
 def test_noise_has_the_same_numbers(noise: sympy.Expr) -> None:
     net = sw.Network("wind")
     net.add(sw.TorqueSource("wind", tau=5 * noise), "a")

@@ -188,8 +188,7 @@ class PartModel:
         names: dict[Symbol, str] = {ACROSS: across, RATE: f"der({across})", **self.symbols}
         if law.has(INTEGRAL):
             names[INTEGRAL] = self._integral(branch)
-        for symbol in branch.template.reads:
-            names.setdefault(symbol, self._reading(symbol, throughs))
+        names |= {symbol: self._reading(symbol, throughs) for symbol in branch.template.reads if symbol not in names}
         return self.printed(law, names)
 
     def printed(self, law: Expr, names: Mapping[Symbol, str]) -> str:
