@@ -168,7 +168,7 @@ def checked_name(name: Any) -> str:
     if (
         not isinstance(name, str)
         or not re.fullmatch(rf"[A-Za-z]\w{{0,{LONGEST - 1}}}", name, re.ASCII)
-        or name in RESERVED
+        or is_taken(name)
     ):
         raise ParameterError(
             f"name = {name!r} must be a name in C, such as 'crane': at most {LONGEST} letters, digits and _, a letter "
