@@ -135,3 +135,14 @@ def test_the_circuit_of_such_a_part_names_its_module(package: Path, tmp_path: Pa
     assert package.is_dir()
     circuit = sw.Network.load(tmp_path / "circuit.toml", trust=["sledges"])
     assert circuit.simulate(1.0).x[-1] == pytest.approx(0.5, rel=1e-12)
+
+
+def test_a_motion_in_a_file_asks_for_the_same_trust(saved: Path, package: Path) -> None:
+    sw.Network.load(saved, trust=["sledges"]).simulate(1.0, t_eval=5, engine="scipy").save(saved.with_name("own.nc"))
+    forget()
+    (package / "imported").unlink()
+    with pytest.raises(sw.ModelFileError, match=r"own\.nc: its network: the part 'Sledge' is of the module"):
+        sw.load_solution(saved.with_name("own.nc"))
+    assert not (package / "imported").exists()
+    again = sw.load_solution(saved.with_name("own.nc"), trust=["sledges"])
+    assert again.max("J.omega") == pytest.approx(0.5, rel=1e-8)
