@@ -218,7 +218,7 @@ R1 2 0 1k
     np.testing.assert_allclose(voltages(text, "2", [*times, 1.59, 1.61]), [opened, *[closed] * 4, opened], rtol=1e-9)
 
 
-@settings(max_examples=20, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=10, suppress_health_check=[HealthCheck.too_slow])
 @given(networks(max_inertias=8))
 def test_what_was_written_is_read_again_and_moves_alike(pieces: Network) -> None:
     """Without ngspice: a linear network, its deck, and the circuit that is read from that, each solved exactly."""
@@ -370,6 +370,19 @@ def test_diodes_may_be_ideal() -> None:
         sw.spice.read(text)
     peak = voltages(text, "2", [5e-3], ideal_diodes=True)
     np.testing.assert_allclose(peak, 1.0, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("source", "options", "words"),
+    [
+        (5, {}, "the text of a netlist"),
+        ("title\n", {"dialect": "pspice"}, "'spice', 'lcapy' or None"),
+        ("title\n", {"values": {"R1": "big"}}, "must be a number"),
+    ],
+)
+def test_wrong_arguments_are_refused(source: object, options: dict[str, object], words: str) -> None:
+    with pytest.raises(sw.ParameterError, match=words):
+        sw.spice.read(source, **options)
 
 
 def test_values_stand_in_for_names_and_win_over_parameters() -> None:

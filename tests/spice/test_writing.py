@@ -102,7 +102,9 @@ SWITCHING = {
 
 
 @NEEDS_NGSPICE
-@pytest.mark.parametrize("name", SWITCHING)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in ("noise", "motor", "stop"))) for name in SWITCHING]
+)
 def test_laws_and_parts_that_switch_move_in_ngspice_as_here(name: str) -> None:
     net, tolerance = SWITCHING[name]
     assert errors(net, 1.0, 8000).max() < tolerance

@@ -106,7 +106,10 @@ def read(
 
     Raises:
         ModelFileError: there is no such file, or lines are not understood; lists them.
+        ParameterError: an argument is none of these.
     """
+    if not isinstance(source, str | os.PathLike):
+        raise ParameterError(f"source = {source!r} must be the text of a netlist, or the pathlib.Path of a file.")
     title, text = ("netlist", source) if isinstance(source, str) else (os.fspath(source), _text_of(Path(source)))
     if dialect not in (None, "spice", "lcapy"):
         raise ParameterError(f"dialect = {dialect!r} must be 'spice', 'lcapy' or None.")
