@@ -526,3 +526,13 @@ def test_a_comparison_of_which_nothing_comes_says_why_and_ends_with_1(capsys: py
     assert main(arguments) == FAILED
     said = capsys.readouterr().err
     assert "No model of shaft 'line' could be compared. Wave(places=5): Shaft 'line': damping = 0.02" in said
+
+
+def test_a_network_is_exported_for_other_tools(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    deck, package = tmp_path / "crane.cir", tmp_path / "crane.mo"
+    assert main(["export", "crane-start", "--spice", str(deck), "--modelica", str(package)]) == DONE
+    assert ".tran" in deck.read_text(encoding="utf-8")
+    assert "Modelica.Mechanics.Rotational" in package.read_text(encoding="utf-8")
+    assert main(["export", "crane-start", "--c", str(tmp_path / "code"), "--input", "motor.n_sync"]) in (DONE, WRONG_INPUT)
+    assert main(["export", "crane-start", "--spice", str(deck), "--input", "motor.tau"]) == WRONG_INPUT
+    assert "Leave out --input" in capsys.readouterr().err

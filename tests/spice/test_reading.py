@@ -223,7 +223,7 @@ R1 2 0 1k
 def test_what_was_written_is_read_again_and_moves_alike(pieces: Network) -> None:
     """Without ngspice: a linear network, its deck, and the circuit that is read from that, each solved exactly."""
     net, times = network_of(pieces), np.linspace(0.0, 0.5, 6)
-    again = sw.spice.read(net.to_spice(0.5))
+    again = sw.spice.read(net.to_spice(t_end=0.5))
     first, second = net.simulate(0.5, t_eval=times), again.simulate(t_eval=times)
     for node, domain in zip(net.graph().nodes, net.graph().domains, strict=True):
         ours = first[f"{node}.{domain.across.name}"]

@@ -19,7 +19,7 @@ def label(name: str) -> str:
 
 def errors(net: sw.Network, t_end: float, steps: int, **options: object) -> np.ndarray:
     """How far the speeds of all nodes are from the voltages of ngspice, in parts of the largest of each."""
-    raw = run_deck(net.to_spice(t_end, step=t_end / steps, **options))
+    raw = run_deck(net.to_spice(t_end=t_end, step=t_end / steps, **options))
     times = np.linspace(0.0, t_end, 52)[1:-1]
     motion = net.simulate(t_end, t_eval=times, rtol=1e-10, **options)
     graph, shares = net.graph(), []
@@ -148,7 +148,7 @@ def test_the_text_names_parts_nodes_values_and_units() -> None:
     net.add(sw.Spring("shaft", c=20000.0, d=14.0), "out", "wheel")
     net.add(sw.Inertia("J2", J=62.5), "wheel")
     net.add(sw.CoulombLoad("load", tau=22.4), "wheel")
-    lines = net.to_spice(6.0).splitlines()
+    lines = net.to_spice(t_end=6.0).splitlines()
     assert lines[0] == "* crane travel"
     for line in (
         ".param smooth=0.0001 ; speed over which a friction changes its sign, rad/s or m/s",
@@ -194,7 +194,7 @@ def test_names_that_spice_takes_for_one_get_numbers() -> None:
     ],
 )
 def test_laws_are_written_as_ngspice_reads_them(law: object, text: str) -> None:
-    deck = loaded((sw.TorqueSource("law", tau=law), "a")).to_spice(1.0)
+    deck = loaded((sw.TorqueSource("law", tau=law), "a")).to_spice(t_end=1.0)
     (row,) = (line for line in deck.splitlines() if line.startswith(("Ilaw", "Blaw")))
     assert row.split(" ", 3)[3].removeprefix("I = ") == text
 

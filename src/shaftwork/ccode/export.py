@@ -15,6 +15,7 @@ from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.core.files import replaced
+from shaftwork.formulation.sampling_instants import refuse_sampled
 from shaftwork.network.netlist import listed
 from shaftwork.pipeline.arguments import Names, as_names
 
@@ -204,9 +205,10 @@ def _refuse(model: CompiledNetwork, inputs: Sequence[str]) -> None:
     """Refuse what has no code in C.
 
     Raises:
-        CompileError: waves, algebraic loops, or an input whose rate would be needed.
+        CompileError: waves, algebraic loops, sampled controllers, or an input whose rate would be needed.
     """
     form, title = model.form, model.name
+    refuse_sampled(form, "C code of the equations alone would leave out what it does", CompileError)
     if form.waves:
         raise CompileError(f"'{title}' has travelling waves, whose equations need the past. Take model=Spectral(16).")
     if form.loop_laws:

@@ -38,7 +38,34 @@ def _c(net: Network, place: str, inputs: list[str], outputs: list[str] | None, t
     return c_code(net.compile(), inputs=inputs, outputs=outputs, t_end=t_end).write(place)
 
 
-EXPORTS = (Export("c", "DIR", "C code in a folder: equations, modes, events, integrators and an example", _c),)
+def _fmu(net: Network, place: str, inputs: list[str], outputs: list[str] | None, t_end: float) -> Iterable[Path]:
+    net.compile().to_fmu(place, inputs=inputs, outputs=outputs, t_end=t_end)
+    return [Path(place)]
+
+
+def _spice(net: Network, place: str, inputs: list[str], outputs: list[str] | None, t_end: float) -> Iterable[Path]:
+    _refuse_chosen("spice", inputs, outputs)
+    net.to_spice(place, t_end=t_end)
+    return [Path(place)]
+
+
+def _modelica(net: Network, place: str, inputs: list[str], outputs: list[str] | None, t_end: float) -> Iterable[Path]:
+    _refuse_chosen("modelica", inputs, outputs)
+    net.to_modelica(place, t_end=t_end)
+    return [Path(place)]
+
+
+def _refuse_chosen(option: str, inputs: list[str], outputs: list[str] | None) -> None:
+    if inputs or outputs:
+        raise ParameterError(f"--{option} writes all sources and quantities. Leave out --input and --output.")
+
+
+EXPORTS = (
+    Export("c", "DIR", "C code in a folder: equations, modes, events, integrators and an example", _c),
+    Export("fmu", "NEW.fmu", "functional mock-up unit (FMI 3.0) for model exchange and co-simulation", _fmu),
+    Export("spice", "NEW.cir", "analogue circuit for ngspice", _spice),
+    Export("modelica", "NEW.mo", "package in Modelica, part by part", _modelica),
+)
 """The formats beside model files."""
 
 
@@ -59,7 +86,7 @@ def export_options(parser: ArgumentParser) -> None:
     )
 
 
-@command("the model file of a scene, to change and run; or C code", export_options)
+@command("the model file of a scene, to change and run; or C code, FMU, SPICE, Modelica", export_options)
 def export(options: Namespace, say: Say) -> Data:
     """The model file of a scene, or of another model file with other values; or the same for other tools."""
     chosen = [one for one in EXPORTS if getattr(options, one.option) is not None]

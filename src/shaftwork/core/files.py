@@ -85,3 +85,17 @@ def write_rows(path: str | Path, head: Sequence[str], rows: Iterable[Sequence[ob
 
     with replaced(path) as file:
         csv.writer(file, lineterminator="\n").writerows([head, *rows])
+
+
+def write_text(text: str, path: str | Path) -> None:
+    """Write a text to a file.
+
+    Raises:
+        ParameterError: there is no such folder, or the file cannot be written.
+    """
+    place = in_a_folder(path)
+    try:
+        with replaced(place) as file:
+            file.write(text)
+    except OSError as error:
+        raise ParameterError(f"{place} cannot be written: {error.strerror or error}. Name another file.") from None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from shaftwork.core.errors import ParameterError, SimulationError
+from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError
 from shaftwork.formulation.form import StateForm
 
 EARLY = 4
@@ -38,19 +38,20 @@ def sampling_instants(form: StateForm, t0: float, t_end: float) -> tuple[float, 
     return tuple(time - EARLY * math.ulp(time) for time in instants)
 
 
-def refuse_sampled(form: StateForm, what: str) -> None:
+def refuse_sampled(form: StateForm, what: str, kind: type[ShaftworkError] = SimulationError) -> None:
     """Refuse a network of whose sampled controllers something is asked that differential equations alone have.
 
     Args:
         form: the state form.
         what: there is not then, "there are no matrices A, B, C, D".
+        kind: of the error.
 
     Raises:
-        SimulationError: it has one.
+        SimulationError: it has one; or another kind of error.
     """
     for part in form.graph.parts:
         if (sampler := part.component.sampler()) is not None:
-            raise SimulationError(
+            raise kind(
                 f"{type(part.component).__name__} '{part.name}' acts every {sampler.period:g} s and holds its output "
                 f"in between, so {what}. Take a continuous controller in its place (without sample_time), or simulate "
                 "the motion."

@@ -106,6 +106,11 @@ class _Writer:
             self._join(node, domain, f"{name}.{connector}")
             yield f"{cls} {name} {quoted(part.name)};"
             return
+        if part.component.measures:
+            self._faults.append(
+                f"'{part.name}' reads {part.component.measures[0]}, which no model of a part can. Take the form 'flat'."
+            )
+            return
         if (standard := standard_class(part, values)) is not None:
             if self._inline and standard.name.endswith("LossyGear"):
                 self._faults.append(f"the gear '{part.name}' takes the class {standard.name}, which is not inline.")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Literal
 
 from sympy import Float, Symbol
@@ -13,9 +12,9 @@ from shaftwork.codegen.start_values import initial_state
 from shaftwork.components.discontinuities import breakpoints
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError, ParameterError
-from shaftwork.core.files import in_a_folder, replaced
 from shaftwork.core.parameters import in_si
 from shaftwork.formulation.form import StateForm
+from shaftwork.formulation.sampling_instants import refuse_sampled
 from shaftwork.modelica.component_writer import component_text
 from shaftwork.modelica.flat_model import flat_text, in_one_mode
 from shaftwork.network.netlist import Netlist
@@ -49,6 +48,7 @@ def modelica_text(
             raise ParameterError(f"{option} = {value!r} must be {' or '.join(map(repr, values))}.")
     end = in_si("t_end", t_end, "s", above=0)
     state_form = sound(netlist)
+    refuse_sampled(state_form, "its instants are not written", CompileError)
     if form == "component":
         start = _start(state_form, initial)
         return component_text(state_form, inline=library == "inline", t_end=end, start=start)
@@ -59,20 +59,6 @@ def modelica_text(
     # a source shows the torque that it gives to its node, a gap what its node gives to it
     turned = tuple(f"{name}.{through}" for name in changing for through in ("tau", "f"))
     return flat_text(state_form, _start(state_form, initial), end, turned)
-
-
-def write_text(text: str, path: str | Path) -> None:
-    """Write a text to a file.
-
-    Raises:
-        ParameterError: there is no such folder, or the file cannot be written.
-    """
-    place = in_a_folder(path)
-    try:
-        with replaced(place) as file:
-            file.write(text)
-    except OSError as error:
-        raise ParameterError(f"{place} cannot be written: {error.strerror or error}. Name another file.") from None
 
 
 def _start(form: StateForm, initial: Mapping[str, float] | None) -> dict[str, float]:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal, cast
 
 from shaftwork.core.errors import NetworkWarning, ShaftworkError
+from shaftwork.core.files import write_text
 from shaftwork.core.notices import muted
 from shaftwork.equations.records import NamedPhase
 from shaftwork.network.netlist import NetworkBuilder
@@ -71,20 +72,29 @@ class ExportedNetwork(NetworkBuilder):
         except ShaftworkError:
             return None
 
-    def to_spice(self, t_end: float = 1.0, *, step: float | None = None, initial: Point = None) -> str:
+    def to_spice(
+        self,
+        path: str | Path | None = None,
+        *,
+        t_end: float = 1.0,
+        step: float | None = None,
+        initial: Point = None,
+    ) -> str:
         """The analogue circuit as a deck for ngspice: speeds are voltages, torques currents, modes smooth laws.
 
         Args:
+            path: a file to which the text is written, "crane.cir"; by default none.
             t_end: end of the motion, s.
             step: longest step of ngspice, s; by default a 2000th of the motion.
             initial: start values, as for `Model.simulate`.
 
         Raises:
             NetworkError: the network cannot be assembled, or a part has no form in SPICE, as rigid contacts.
+            ParameterError: the file cannot be written.
         """
         from shaftwork.spice.deck import deck
 
-        return deck(cast("Network", self).compile(), t_end, step, initial)
+        return _written(deck(cast("Network", self).compile(), t_end, step, initial), path)
 
     def to_modelica(
         self,
@@ -111,9 +121,13 @@ class ExportedNetwork(NetworkBuilder):
             CompileError: a part or a law has no such form; the message names it.
             ParameterError: there is no such form or library, or the file cannot be written.
         """
-        from shaftwork.modelica.modelica_export import modelica_text, write_text
+        from shaftwork.modelica.modelica_export import modelica_text
 
-        text = modelica_text(self.netlist(), sound, form, library, t_end, initial)
-        if path is not None:
-            write_text(text, path)
-        return text
+        return _written(modelica_text(self.netlist(), sound, form, library, t_end, initial), path)
+
+
+def _written(text: str, path: str | Path | None) -> str:
+    """A text, that is written to a file where one is named."""
+    if path is not None:
+        write_text(text, path)
+    return text

@@ -6,9 +6,10 @@ import textwrap
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from shaftwork.core.errors import Diagnostic, NetworkError, ParameterError
+from shaftwork.core.errors import CompileError, Diagnostic, NetworkError, ParameterError
 from shaftwork.core.parameters import in_si
 from shaftwork.formulation.form import StateForm, integral_name, store_name
+from shaftwork.formulation.sampling_instants import refuse_sampled
 from shaftwork.network.graph import GraphPart
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import REFERENCE, title
@@ -38,6 +39,7 @@ def deck(model: Model, t_end: float, step: float | None, initial: Any) -> str:
 
     Raises:
         NetworkError: the network cannot be assembled, or has parts that SPICE has no form for; lists every reason.
+        CompileError: a controller samples.
         ParameterError: a time is not above zero.
     """
     end = in_si("t_end", t_end, "s", above=0)
@@ -47,6 +49,7 @@ def deck(model: Model, t_end: float, step: float | None, initial: Any) -> str:
             f"step = {longest:g} s is longer than t_end = {end:g} s. Leave it out for t_end / {STEPS}."
         )
     form = model.form
+    refuse_sampled(form, "no circuit does what it does", CompileError)
     parts, problems = _smoothed(form)
     elements = Elements(form.graph, parts, form.tree.redundant, _stored(model, initial), end, EDGE * longest)
     lines: list[str] = []

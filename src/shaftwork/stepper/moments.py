@@ -276,7 +276,7 @@ def smooth_steps(model: CompiledModel, problem: Problem, demand: Demand, place: 
     form = model.form
     if demand.engine not in SMOOTH or not available("heyoka"):
         return None
-    if form.waves or form.loop_laws or form.doubtful:
+    if form.waves or form.loop_laws or form.doubtful or form.samples:
         return None
     from shaftwork.integrate.taylor.smooth_steps import SmoothSteps
 
