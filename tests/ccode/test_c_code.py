@@ -86,7 +86,7 @@ def test_a_random_train_that_switches_ends_as_in_the_library(seed: int) -> None:
     assert np.abs(speeds - wanted).max() < MOTION * max(1.0, np.abs(wanted).max()) + uncertain
 
 
-QUICK = ("crane-start", "crane", "six-phases")
+QUICK = ("crane-start", "crane")
 
 
 @pytest.mark.parametrize(
@@ -94,18 +94,29 @@ QUICK = ("crane-start", "crane", "six-phases")
 )
 def test_scenes_move_as_in_the_library(name: str, tmp_path: Path) -> None:
     scene = SCENES[name]
-    model, t_end = scene().compile(), scene.t_end / (1 if name in QUICK else 10)
+    model, t_end = scene().compile(), scene.t_end / (1 if name in (*QUICK, "six-phases") else 10)
     library = Library(c_code(model), tmp_path)
-    library.call("integrate", t_end, RTOL)
+    library.call("integrate", t_end, 0.1 * RTOL)
     sol = model.simulate(t_end, rtol=RTOL, t_eval=200)
-    # the load of the excavator has kinks over the angle, past which steps lose some digits
-    assert difference(library, sol) < 10 * MOTION * (10 if name.startswith("excavator") else 1)
+    largest = [max(np.abs(sol[variable.name]).max(), 1e-3) for variable in library.code.states]
+    wanted = [sol[variable.name][-1] for variable in library.code.states]
+    # the load of the excavator has kinks over the angle, and shafts without damping swing thousands of times
+    assert (np.abs(library.x - wanted) / largest).max() < MOTION * (1 if name in QUICK else 50)
     if model.phased:
         assert library.modes == [*sol.phases[-1].modes.values()]
 
 
 @pytest.mark.parametrize(
-    "name", ["TableMotor", "CageMotor", "RandomLoad", "SpeedController", "Switch", "Diode", "BLDCMotor"]
+    "name",
+    [
+        "TableMotor",
+        "CageMotor",
+        "RandomLoad",
+        "SpeedController",
+        "Switch",
+        "Diode",
+        pytest.param("BLDCMotor", marks=pytest.mark.slow),
+    ],
 )
 def test_tables_noise_controllers_and_diodes_move_as_in_the_library(name: str, tmp_path: Path) -> None:
     model = bed_of(name).compile()

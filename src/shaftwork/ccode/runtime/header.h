@@ -38,8 +38,7 @@ enum {
     NAME_STEP_TOO_SMALL = -1,
     NAME_TOO_MANY_EVENTS = -2,
     NAME_NO_CONSISTENT_MODES = -3,
-    NAME_GAINS_ENERGY = -4,
-    NAME_TOO_MANY_STEPS = -5
+    NAME_TOO_MANY_STEPS = -4
 };
 
 typedef struct NAME {
