@@ -119,10 +119,8 @@ def advance(rates, p, span, limits, x, atol, rtol, ends, lengths, states, part, 
         if not step > 10 * np.spacing(abs(t)):
             break
         left = end - t
-        length = min(step, longest)
-        last = length >= left
-        if last:
-            length = left
+        last = min(step, longest) >= left
+        length = left if last else min(step, longest)
         _all_stages(rates, p, span, t, begin, length, slopes, y, new)
         tried += 1
         fifth, third = 0.0, 0.0
