@@ -86,7 +86,7 @@ def export_options(parser: ArgumentParser) -> None:
     )
 
 
-@command("the model file of a scene, to change and run; or C code, FMU, SPICE, Modelica", export_options)
+@command("the model file of a scene; or C code, FMU, SPICE, Modelica", export_options)
 def export(options: Namespace, say: Say) -> Data:
     """The model file of a scene, or of another model file with other values; or the same for other tools."""
     chosen = [one for one in EXPORTS if getattr(options, one.option) is not None]
