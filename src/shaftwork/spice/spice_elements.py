@@ -12,7 +12,7 @@ from shaftwork.components.discontinuities import breakpoints
 from shaftwork.components.laws import replaced, t
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, readings_of
 from shaftwork.network.kinds import Kind
-from shaftwork.network.netlist import by_part
+from shaftwork.network.netlist import by_part, unused
 from shaftwork.spice.smoothed_modes import SmoothedPart
 from shaftwork.spice.spice_laws import of_time, printed, waveform
 
@@ -24,18 +24,15 @@ class Labels:
 
     def __init__(self) -> None:
         self._labels: dict[tuple[str, str, int], str] = {}
-        self._taken = set[str]()  # only asked for membership
+        self._taken = dict[str, set[str]]()  # only asked for membership
 
     def of(self, kind: str, name: str, key: int = 0) -> str:
         """The label of a name; the same name and key of the same kind have the same one."""
         if (kind, name, key) not in self._labels:
             plain = re.sub("[^A-Za-z0-9]", "_", name).lower() or "n"
-            label, count = plain, 1
-            while f"{kind}{label}" in self._taken or label in RESERVED:
-                count += 1
-                label = f"{plain}_{count}"
-            self._taken.add(f"{kind}{label}")
-            self._labels[kind, name, key] = label
+            taken = self._taken.setdefault(kind, {*RESERVED})
+            self._labels[kind, name, key] = unused(plain, taken, "{}_{}")
+            taken.add(self._labels[kind, name, key])
         return self._labels[kind, name, key]
 
 
