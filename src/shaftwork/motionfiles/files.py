@@ -10,7 +10,8 @@ import numpy as np
 
 from shaftwork.core.errors import ModelFileError, ParameterError, imported
 from shaftwork.core.files import drafted, in_a_folder
-from shaftwork.motionfiles.record import ARRIVING, Call, record_text
+from shaftwork.motionfiles.record import ARRIVING, record_text
+from shaftwork.pipeline.motion_start import Repetition
 from shaftwork.results.data_frames import to_pandas, to_xarray
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
@@ -22,7 +23,7 @@ SLASH, INSTEAD = "/", "\N{DIVISION SLASH}"
 Columns = Mapping[str, Array]
 
 
-def write_motion(call: Call, motion: Solution, path: Any, names: Sequence[str]) -> None:
+def write_motion(call: Repetition, motion: Solution, path: Any, names: Sequence[str]) -> None:
     """Write a motion; see `Solution.save`."""
     place = in_a_folder(path)
     writer, _ = _format_of(place)
