@@ -16,7 +16,7 @@ from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.core.files import replaced
 from shaftwork.formulation.sampling_instants import refuse_sampled
 from shaftwork.network.netlist import listed
-from shaftwork.pipeline.arguments import Names, as_names
+from shaftwork.pipeline.arguments import STAND_IN, Names, as_names
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.model import Model
@@ -32,8 +32,6 @@ RESERVED = frozenset(
 """Words of the language and its mathematics that the runtime does not use; only asked for membership."""
 LONGEST = 40
 """Signs of a name: 63 of a function's name count in C99, and what it does stands behind the name."""
-RUNNING = 1.0
-"""The value that stands for an input while equations are made: an exact zero would leave it out of them."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +99,7 @@ def c_code(
     called = c_name(model.name) if name is None else checked_name(name)
     values = _input_values(model, as_names(inputs or ()))
     if values:
-        model = model.with_values(dict.fromkeys(values, RUNNING))
+        model = model.with_values(dict.fromkeys(values, STAND_IN))
     _refuse(model, [*values])
     writer = CodeWriter(model, values, None if outputs is None else as_names(outputs))
     return CCode(

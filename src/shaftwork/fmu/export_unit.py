@@ -16,12 +16,13 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from shaftwork.ccode.equation_set import EquationSet
-from shaftwork.ccode.export import RUNNING, CCode, c_code
+from shaftwork.ccode.export import CCode, c_code
 from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.core.files import drafted, in_a_folder
 from shaftwork.core.parameters import in_si
 from shaftwork.fmu.unit_description import KINDS, build_description, model_description
 from shaftwork.fmu.unit_interface import UnitInterface, UnitVariable
+from shaftwork.pipeline.arguments import STAND_IN
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.model import Model
@@ -83,7 +84,7 @@ def _dependencies(model: Model, code: CCode) -> dict[str, tuple[str, ...]]:
     """The states and inputs in each rate and output; of a network whose modes change them nothing is told."""
     if model.phased:
         return {}
-    inputs = dict.fromkeys((variable.name for variable in code.inputs), RUNNING)
+    inputs = dict.fromkeys((variable.name for variable in code.inputs), STAND_IN)
     equations = EquationSet(model.with_values(inputs) if inputs else model)
     rates = {state.name: rate for state, rate in zip(equations.rows.states, equations.rows.rates, strict=True)}
     laws = {f"der({name})": rate for name, rate in rates.items()}
