@@ -533,6 +533,9 @@ def test_a_network_is_exported_for_other_tools(tmp_path: Path, capsys: pytest.Ca
     assert main(["export", "crane-start", "--spice", str(deck), "--modelica", str(package)]) == DONE
     assert ".tran" in deck.read_text(encoding="utf-8")
     assert "Modelica.Mechanics.Rotational" in package.read_text(encoding="utf-8")
-    assert main(["export", "crane-start", "--c", str(tmp_path / "code"), "--input", "motor.n_sync"]) in (DONE, WRONG_INPUT)
+    assert main(["export", "crane-start", "--c", str(tmp_path / "code"), "--input", "motor.n_sync"]) in (
+        DONE,
+        WRONG_INPUT,
+    )
     assert main(["export", "crane-start", "--spice", str(deck), "--input", "motor.tau"]) == WRONG_INPUT
     assert "Leave out --input" in capsys.readouterr().err
