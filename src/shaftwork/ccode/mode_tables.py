@@ -7,7 +7,7 @@ from collections import ChainMap
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from itertools import product
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sympy import Expr, Integer, Piecewise
 
@@ -21,10 +21,12 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.components.modes import Leave
 from shaftwork.core.errors import CompileError, NetworkError
 from shaftwork.hybrid.consistency import rounding_moves
-from shaftwork.hybrid.hybrid_model import HybridModel
 from shaftwork.hybrid.modes.mode_machines import ModeGuards, ModeMachine, ModeNames
 from shaftwork.network.graph import GROUND
 from shaftwork.network.netlist import listed
+
+if TYPE_CHECKING:
+    from shaftwork.hybrid.hybrid_model import HybridModel
 
 MOST_SETS = 256
 """Sets of equations: more would make code that takes minutes to compile."""

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from shaftwork.modelfiles.storage import netlist_text
-from shaftwork.pipeline.motion_start import Ending, Repetition
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
+
+if TYPE_CHECKING:
+    from shaftwork.pipeline.motion_start import Repetition
 
 FORMAT = 1
 """Version of what is written here; a reader refuses newer ones."""
@@ -34,11 +36,12 @@ def record_text(motion: Solution, call: Repetition) -> str:
 
 
 def _call(call: Repetition, t: Array) -> dict[str, Any]:
-    initial, demand = call.initial, call.demand
+    demand = call.demand
     compiler: Any = call.rebuild
+    initial: Any = call.initial  # values, or the end of a motion before
     times = "t" if demand.t_eval is not None and np.array_equal(demand.t_eval, t) else demand.t_eval
     before = None
-    if isinstance(initial, Ending):
+    if hasattr(initial, "waves"):
         if initial.waves is not None:
             return {"why": "it went on from a motion with waves on their way through shafts"}
         before = {"t": initial.t, "read": initial.read, "modes": initial.modes, "parameters": initial.parameters}
