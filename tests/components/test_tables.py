@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import shaftwork as sw
+from tests.mangling import mangled
 
 LOGGER = """\ufeff# measured on the test bench
 time;speed;torque
@@ -154,17 +155,8 @@ def test_mutated_records_are_read_or_refused(tmp_path: Path) -> None:
     chance, path = random.Random(3), tmp_path / "bench.csv"  # noqa: S311
     texts = [LOGGER, "t [ms],omega [rpm]\n0,0\n500,60\n", "2026-03-01T12:00:00,1\n2026-03-01T12:00:01.5,2\n"]
     for _ in range(1000):
-        text = list(chance.choice(texts))
-        for _ in range(chance.randint(1, 5)):
-            place = chance.randrange(len(text))
-            match chance.randrange(3):
-                case 0:
-                    text[place] = chance.choice(";,.0123456789-eE:TZ[]()\"'\n\0 \u00e4\u0661*/^")
-                case 1:
-                    del text[place : place + chance.randint(1, 5)]
-                case _:
-                    text[place:place] = text[chance.randrange(len(text)) :][:9]
-        path.write_text("".join(text), encoding="utf-8")
+        text = mangled(chance.choice(texts), chance, ";,.0123456789-eE:TZ[]()\"'\n\0 \u00e4\u0661*/^")
+        path.write_text(text, encoding="utf-8")
         signs = {"delimiter": ";", "decimal": ","} if ";" in text else {}
         units = chance.choice(((None, None), ("s", "rad/s"), ("s", "N*m")))
         try:

@@ -209,20 +209,8 @@ def mutated(text: str, chance: random.Random) -> str:
         words = re.findall(r"\w+|[^\w\s]", text) or ["x"]
         begin = chance.randrange(len(text) + 1)
         end = begin + chance.randrange(1, 30)
-        numbers = [
-            "0",
-            "-1",
-            "1e400",
-            "1/0",
-            "9^9^9^9",
-            "(0-1)^0.5",
-            "true",
-            "time",
-            "{1}",
-            '"x"',
-            "log(0)",
-            "(" * 5000,
-        ]
+        values = ["0", "-1", "1e400", "1/0", "9^9^9^9", "(0-1)^0.5", "true", "time", "{1}", '"x"', "log(0)"]
+        numbers = [*values, "(" * 5000]
         middle = chance.choice(["", chance.choice("(){}[];,=\\é"), text[begin:end] * 3, *words[:3], *numbers[:3]])
         text = text[:begin] + chance.choice([middle, chance.choice(words), chance.choice(numbers)]) + text[end:]
     return text

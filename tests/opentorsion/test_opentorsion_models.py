@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from scipy.linalg import eigh, eigvals
 
 import shaftwork as sw
+from tests.mangling import mangled
 
 Array = np.ndarray
 
@@ -351,16 +352,8 @@ def test_a_file_that_is_no_system_is_refused(text: str, tmp_path: Path) -> None:
 def test_mutated_systems_are_read_or_refused(tmp_path: Path) -> None:
     chance, path = random.Random(7), tmp_path / "system.json"  # noqa: S311
     for _ in range(1000):
-        text = list(json.dumps(chance.choice((wind_turbine(), gearbox()))))
-        for _ in range(chance.randint(1, 6)):
-            place = chance.randrange(len(text))
-            match chance.randrange(3):
-                case 0:
-                    text[place] = chance.choice('{}[]":,.0123456789-eE nul\\\u00e4')
-                case 1:
-                    del text[place : place + chance.randint(1, 20)]
-                case _:
-                    text[place:place] = text[chance.randrange(len(text)) :][:20]
-        path.write_text("".join(text), encoding="utf-8")
+        system = json.dumps(chance.choice((wind_turbine(), gearbox())))
+        text = mangled(system, chance, '{}[]":,.0123456789-eE nul\\\u00e4', changes=6, longest=20)
+        path.write_text(text, encoding="utf-8")
         with suppress(sw.ModelFileError):
             sw.from_opentorsion(path).check()  # which never raises

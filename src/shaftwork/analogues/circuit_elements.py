@@ -11,7 +11,7 @@ from sympy import Expr, Float
 from shaftwork.components.laws import replaced
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart, ends_of
 from shaftwork.network.kinds import Kind
-from shaftwork.network.netlist import REFERENCE
+from shaftwork.network.netlist import REFERENCE, unused
 
 Edge = tuple[int, int]
 """A branch and the number of its term, as `CircuitGraph.multigraph` keys them."""
@@ -90,10 +90,7 @@ class ElementNames:
 
     def unique(self, name: str) -> str:
         """A name, or one with a number where that is taken; it is taken from then on."""
-        count, first = 1, name
-        while name in self._taken:
-            count += 1
-            name = f"{first} {count}"
+        name = unused(name, self._taken)
         self._taken.add(name)
         return name
 

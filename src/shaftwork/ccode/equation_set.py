@@ -5,49 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, Protocol
 
-from shaftwork.codegen.array_form.arrays import BoundArrays
+from shaftwork.codegen.compiled_model import CompiledModel
 from shaftwork.core.errors import CompileError
 from shaftwork.formulation.explicit_rows import BlockTooLargeError, Rows, explicit_rows
 from shaftwork.formulation.form import StateForm
 from shaftwork.formulation.observables import Observables
-from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.prepared import nominal_tolerances
-
-
-class CompiledNetwork(Protocol):
-    """What is written in C of a compiled model; `pipeline.model.Model` is one, and comes here by its door."""
-
-    phased: ClassVar[bool]
-    """Whether parts change their mode."""
-    form: StateForm
-    """Of the first mode of each part."""
-    netlist: Netlist
-    """What it was made of."""
-
-    @property
-    def name(self) -> str:
-        """Title of the network."""
-        ...
-
-    def bind(self) -> BoundArrays:
-        """The equations with their parameters."""
-        ...
-
-    def with_values(self, values: Mapping[str, Any]) -> CompiledNetwork:
-        """The model of the same network with other values."""
-        ...
-
-
-class EquationsByArrays(Protocol):
-    """Compiled equations."""
-
-    form: StateForm
-
-    def bind(self) -> BoundArrays:
-        """The equations with their parameters."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +22,7 @@ class EquationSet:
         model: the compiled equations.
     """
 
-    model: EquationsByArrays
+    model: CompiledModel
 
     @property
     def form(self) -> StateForm:

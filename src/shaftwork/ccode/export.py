@@ -6,9 +6,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from shaftwork.ccode.equation_set import CompiledNetwork
 from shaftwork.ccode.texts import runtime_names
 from shaftwork.ccode.writer import CodeWriter, Variable
 from shaftwork.components.laws import as_expression
@@ -17,54 +16,22 @@ from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.core.files import replaced
 from shaftwork.formulation.sampling_instants import refuse_sampled
 from shaftwork.network.netlist import listed
-from shaftwork.pipeline.arguments import Names, as_names
+from shaftwork.pipeline.arguments import STAND_IN, Names, as_names
+
+if TYPE_CHECKING:
+    from shaftwork.pipeline.model import Model
 
 RESERVED = frozenset(
-    [
-        "auto",
-        "continue",
-        "extern",
-        "float",
-        "goto",
-        "inline",
-        "main",
-        "register",
-        "short",
-        "signed",
-        "typedef",
-        "union",
-        "unsigned",
-        "volatile",
-        "abs",
-        "acos",
-        "acosh",
-        "asin",
-        "asinh",
-        "atan",
-        "atan2",
-        "atanh",
-        "cbrt",
-        "cos",
-        "cosh",
-        "erf",
-        "exp",
-        "hypot",
-        "log",
-        "log10",
-        "log2",
-        "pow",
-        "sin",
-        "sinh",
-        "sqrt",
-        "tan",
-        "tanh",
-    ]
+    re.findall(
+        r"\w+",
+        "auto continue extern float goto inline main register short signed typedef union unsigned volatile "
+        "abs acos acosh asin asinh atan atan2 atanh cbrt cos cosh erf exp hypot log log10 log2 pow sin sinh sqrt "
+        "tan tanh",
+    )
 )
 """Words of the language and its mathematics that the runtime does not use; only asked for membership."""
 LONGEST = 40
 """Signs of a name: 63 of a function's name count in C99, and what it does stands behind the name."""
-RUNNING = 1.0
-"""The value that stands for an input while equations are made: an exact zero would leave it out of them."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +77,7 @@ class CCode:
 
 
 def c_code(
-    model: CompiledNetwork,
+    model: Model,
     *,
     name: str | None = None,
     inputs: Names = (),
@@ -132,7 +99,7 @@ def c_code(
     called = c_name(model.name) if name is None else checked_name(name)
     values = _input_values(model, as_names(inputs or ()))
     if values:
-        model = model.with_values(dict.fromkeys(values, RUNNING))
+        model = model.with_values(dict.fromkeys(values, STAND_IN))
     _refuse(model, [*values])
     writer = CodeWriter(model, values, None if outputs is None else as_names(outputs))
     return CCode(
@@ -178,7 +145,7 @@ def checked_name(name: Any) -> str:
     return name
 
 
-def _input_values(model: CompiledNetwork, inputs: Sequence[str]) -> dict[str, float]:
+def _input_values(model: Model, inputs: Sequence[str]) -> dict[str, float]:
     """The default value of each input: that of its law at t = 0, or 0 where it depends on more than the time.
 
     Raises:
@@ -201,7 +168,7 @@ def _input_values(model: CompiledNetwork, inputs: Sequence[str]) -> dict[str, fl
     return values
 
 
-def _refuse(model: CompiledNetwork, inputs: Sequence[str]) -> None:
+def _refuse(model: Model, inputs: Sequence[str]) -> None:
     """Refuse what has no code in C.
 
     Raises:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections import ChainMap
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from itertools import product
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sympy import Expr, Integer, Piecewise
 
-from shaftwork.ccode.equation_set import CompiledNetwork, EquationSet
+from shaftwork.ccode.equation_set import EquationSet
 from shaftwork.ccode.printing import Statements, array, function, text_of
 from shaftwork.ccode.set_functions import SetFunctions
 from shaftwork.ccode.texts import dispatcher, runtime
@@ -24,9 +25,11 @@ from shaftwork.hybrid.modes.mode_machines import ModeGuards, ModeMachine, ModeNa
 from shaftwork.network.graph import GROUND
 from shaftwork.network.netlist import listed
 
+if TYPE_CHECKING:
+    from shaftwork.hybrid.hybrid_model import HybridModel
+
 MOST_SETS = 256
 """Sets of equations: more would make code that takes minutes to compile."""
-FLAGS = ("by_torque", "by_time", "by_twist", "rebounds", "by_speed", "as_it_closes", "as_it_pulls")
 
 
 class ModeTables:
@@ -39,8 +42,8 @@ class ModeTables:
         CompileError: there are too many sets of equations, or a gear passes on torques by their direction.
     """
 
-    def __init__(self, model: CompiledNetwork) -> None:
-        self._model, self._sets = model, model.equation_sets  # type: ignore[attr-defined]  # of a model with phases
+    def __init__(self, model: HybridModel) -> None:
+        self._model, self._sets = model, model.equation_sets
         self._machines: tuple[ModeMachine, ...] = self._sets.machines
         self._refuse()
 
@@ -165,7 +168,7 @@ class ModeTables:
 
     def _gains(self, one: SetFunctions, speeds: Sequence[Expr]) -> Iterator[tuple[str, Expr]]:
         """What the speed across each machine has of that of each inertia; nothing where torques tell it as well."""
-        form, nx = one.form, "NX"
+        form = one.form
         massless = {branch for kind in WITHOUT_INERTIA for branch in form.tree.tree[kind]}  # only asked for membership
         symbols = one.rows.states[form.speeds]
         for k, (machine, speed) in enumerate(zip(self._machines, speeds, strict=True)):
@@ -176,7 +179,7 @@ class ModeTables:
                 continue
             for j, symbol in enumerate(symbols):
                 if (gain := speed.diff(symbol)) != 0:
-                    yield f"gains[{k} * {nx} + {j}]", gain
+                    yield f"gains[{k} * NX + {j}]", gain
 
     def _leave_numbers(self, one: SetFunctions, statements: Statements) -> str:
         """Restitution, speed of rest and twist at the limit of each leave that rebounds."""
@@ -225,12 +228,10 @@ class ModeTables:
         yield _integers("RIGID", [machine.is_rigid(mode.name) if mode else 0 for machine, _, mode in cells])
         sides = [machine.opening_side(mode.name) or 0.0 if mode else 0.0 for machine, _, mode in cells]
         yield array("const double", "OPENING", [*map(repr, map(float, sides))])
-        ways = [[*mode.gives_way[:2]] if mode else [] for _, _, mode in cells]
-        ways = [[*way, *([(0.0, "")] * (2 - len(way)))] for way in ways]
-        yield _integers(
-            "GIVES_WAY", [self._place(k, to) for (_, k, _), way in zip(cells, ways, strict=True) for _, to in way]
-        )
-        yield array("const double", "WAY_SIDE", [repr(float(side)) for way in ways for side, _ in way])
+        exits = [[*(mode.gives_way if mode else ()), (0.0, ""), (0.0, "")][:2] for _, _, mode in cells]
+        places = [self._place(k, to) for (_, k, _), pair in zip(cells, exits, strict=True) for _, to in pair]
+        yield _integers("GIVES_WAY", places)
+        yield array("const double", "WAY_SIDE", [repr(float(side)) for pair in exits for side, _ in pair])
         yield _integers("ONE_WAY", [machine.is_one_way for machine in machines])
         yield _integers("IS_SWITCH", [machine.is_switch for machine in machines])
         yield _integers("IS_TORQUE", torques)
@@ -241,16 +242,16 @@ class ModeTables:
         rows = []
         for (k, name, _), leave in self._leaves.items():
             slope = leave.when.diff(INTEGRAL)
-            how = {
-                "by_torque": leave.by_torque,
-                "by_time": leave.by_time,
-                "by_twist": leave.by_twist,
-                "rebounds": leave.rebound is not None,
-                "by_speed": leave.by_speed,
-                "as_it_closes": leave.when == ACROSS,
-                "as_it_pulls": leave.when == -THROUGH,
+            flags_of = {
+                "BY_TORQUE": leave.by_torque,
+                "BY_TIME": leave.by_time,
+                "BY_TWIST": leave.by_twist,
+                "REBOUNDS": leave.rebound is not None,
+                "BY_SPEED": leave.by_speed,
+                "AS_IT_CLOSES": leave.when == ACROSS,
+                "AS_IT_PULLS": leave.when == -THROUGH,
             }
-            flags = " | ".join(flag.upper() for flag in FLAGS if how[flag]) or "0"
+            flags = " | ".join(flag for flag, holds in flags_of.items() if holds) or "0"
             twist = float(slope) if slope.is_number else 0.0
             rows.append(f"{{{k}, {self._place(k, name)}, {self._place(k, leave.to)}, {flags}, {twist!r}}}")
         yield array("const Leave", "LEAVES", rows)
@@ -272,9 +273,7 @@ class ModeTables:
         """Where speeds and twists are among the states, and how far rounding moves each."""
         states = [*dict.fromkeys(state.name for one in self.sets for state in one.form.states)]
         stores = StateTransfer(self.sets[0].form).names
-        nominal: dict[str, float] = {}
-        for one in self.sets:
-            nominal = {**one.nominal, **nominal}
+        nominal = ChainMap(*(dict(one.nominal) for one in self.sets))
         moves = rounding_moves([nominal[name] for name in states])
         for name, column in (("MOVE_PART", 0), ("MOVE_LEAST", 1), ("MOVE_REACH", 3)):
             yield array("const double", name, [repr(float(move[column])) for move in moves])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -107,13 +108,9 @@ def _in_pieces(expression: Expr) -> Expr:
 def function(head: str, lines: Sequence[str]) -> str:
     """A static C function; arguments that its lines do not read are marked as unused."""
     names = [argument.split("*")[-1].split(" ")[-1] for argument in head[head.index("(") + 1 : -1].split(", ")]
-    words = {word for line in lines for word in _words(line)}
+    words = {word for line in lines for word in re.findall(r"\w+", line)}
     unused = [f"(void){name};" for name in names if name not in words]
     return "\n".join([f"static {head}", "{", *(f"    {line}" for line in (*unused, *lines)), "}", ""])
-
-
-def _words(line: str) -> list[str]:
-    return "".join(sign if sign.isalnum() or sign == "_" else " " for sign in line).split()
 
 
 def text_of(value: str) -> str:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections import ChainMap
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 from sympy import Symbol
 
-from shaftwork.ccode.equation_set import CompiledNetwork, EquationSet
+from shaftwork.ccode.equation_set import EquationSet
 from shaftwork.ccode.instants import Instants
 from shaftwork.ccode.printing import Statements, array
 from shaftwork.ccode.set_functions import ArrayLayout, SetFunctions, stored_symbol
@@ -21,6 +22,8 @@ from shaftwork.network.netlist import listed
 
 if TYPE_CHECKING:
     from shaftwork.ccode.mode_tables import ModeTables
+    from shaftwork.hybrid.hybrid_model import HybridModel
+    from shaftwork.pipeline.model import Model
 
 DISPATCHED = {
     "rates": ("const double *restrict x", "double *restrict dx"),
@@ -55,7 +58,7 @@ class CodeWriter:
         wanted: names of the outputs, or None for all quantities.
     """
 
-    def __init__(self, model: CompiledNetwork, inputs: Mapping[str, float], wanted: Sequence[str] | None) -> None:
+    def __init__(self, model: Model, inputs: Mapping[str, float], wanted: Sequence[str] | None) -> None:
         self._model, self._inputs, self._wanted = model, inputs, wanted
 
     @cached_property
@@ -65,7 +68,7 @@ class CodeWriter:
             return None
         from shaftwork.ccode.mode_tables import ModeTables
 
-        return ModeTables(self._model)
+        return ModeTables(cast("HybridModel", self._model))
 
     @cached_property
     def sets(self) -> tuple[EquationSet, ...]:
@@ -144,8 +147,7 @@ class CodeWriter:
     @cached_property
     def _source(self) -> str:
         modes, statements = self.modes, Statements(self._names, self._model.name)
-        names = (tuple(v.name for v in some) for some in (self.states, self.outputs))
-        states, outputs = names
+        states, outputs = (tuple(v.name for v in some) for some in (self.states, self.outputs))
         layout = ArrayLayout(states, self.stores, outputs, statements)
         functions = [SetFunctions(number, one, layout) for number, one in enumerate(self.sets)]
         still = [symbol for symbol, code in self._names.items() if code.startswith(("m->p", "m->u"))]
@@ -186,9 +188,7 @@ class CodeWriter:
 
     @property
     def _nominal(self) -> str:
-        nominal: dict[str, float] = {}
-        for one in self.sets:
-            nominal = {**one.nominal, **nominal}
+        nominal = ChainMap(*(dict(one.nominal) for one in self.sets))
         return array("const double", "NOMINAL", [repr(nominal[variable.name]) for variable in self.states])
 
     @property

@@ -117,8 +117,8 @@ class _MachinePrinter(FloatPrinter):
     def _of_table(self, function: Any) -> str:
         data, names = (function.xs, function.ys), []
         for values in data:
-            known = (name for name, array in self._tables.items() if np.array_equal(array, values))
-            name = next(known, f"table{len(self._tables)}")
+            equal = (name for name, array in self._tables.items() if np.array_equal(array, values))
+            name = next(equal, f"table{len(self._tables)}")
             self._tables[name] = np.array(values, dtype=float)
             names.append(name)
         return f"{self._print(function.argument)}, {', '.join(names)}"

@@ -211,15 +211,15 @@ class Controller(Component):
         for name in (*states, *self._held()):
             yield AcrossStore(Integer(1), (name, None), name)
         if sampler is None:
-            asked = [Float(value) if value else Integer(0) for value in self._setpoints().tolist()]
-            e = [point - measured_of(name) for point, name in zip(asked, self.measured.names, strict=True)]
+            points = [Float(value) if value else Integer(0) for value in self._setpoints().tolist()]
+            e = [point - measured_of(name) for point, name in zip(points, self.measured.names, strict=True)]
             e[0] += p.reference
             for name, row, gains in zip(states, A, B, strict=True):
                 yield ThroughLaw(_sum(row, x) + _sum(gains, e), (None, name), name.replace("x", "w"))
-            given = [_sum(row, x) + _sum(gains, e) for row, gains in zip(C, D, strict=True)]
+            outputs = [_sum(row, x) + _sum(gains, e) for row, gains in zip(C, D, strict=True)]
         else:
-            given = [across_of(name) for name in self._held()]
-        for law, port, kind in zip(given, self.ports, self.acts.names, strict=True):
+            outputs = [across_of(name) for name in self._held()]
+        for law, port, kind in zip(outputs, self.ports, self.acts.names, strict=True):
             branch = ACTS[kind][1]
             label = port.name.replace("a", "u") if len(self.ports) > 1 else "u"
             yield branch(-law if branch is ThroughLaw else law, (port.name, None), label)
@@ -272,10 +272,10 @@ class StateSpaceController(Controller):
         """As given; without A there are no states, without D there is no direct way through."""
         k, m = len(self.measured.names), len(self.acts.names)
         n = 0 if self.A is None else len(self.A.rows)
-        given = ((self.A, (n, n)), (self.B, (n, k)), (self.C, (m, n)), (self.D, (m, k)))
+        sized = ((self.A, (n, n)), (self.B, (n, k)), (self.C, (m, n)), (self.D, (m, k)))
         A, B, C, D = (
             np.zeros(shape) if gains is None or not (gains.rows or 0 not in shape) else gains.array
-            for gains, shape in given
+            for gains, shape in sized
         )
         return A, B, C, D
 
@@ -305,8 +305,8 @@ class StateSpaceController(Controller):
                 f"{cls.__name__} '{name}': the system is discrete and has no sample time. Give it one, dt=0.01."
             )
         labels = [label.replace(":", ".") for label in getattr(system, "input_labels", ())]
-        given = {**matrices, "measured": labels or None, "sample_time": period or None, **values}
-        return cls(name, **{key: value for key, value in given.items() if value is not None})
+        parameters = {**matrices, "measured": labels or None, "sample_time": period or None, **values}
+        return cls(name, **{key: value for key, value in parameters.items() if value is not None})
 
 
 @component

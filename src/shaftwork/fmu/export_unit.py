@@ -9,19 +9,20 @@ import shutil
 import subprocess
 import sys
 import zipfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from shaftwork.ccode.equation_set import EquationSet
-from shaftwork.ccode.export import RUNNING, CCode, c_code
+from shaftwork.ccode.export import CCode, c_code
 from shaftwork.core.errors import CompileError, ParameterError
-from shaftwork.core.files import in_a_folder
+from shaftwork.core.files import drafted, in_a_folder
 from shaftwork.core.parameters import in_si
 from shaftwork.fmu.unit_description import KINDS, build_description, model_description
 from shaftwork.fmu.unit_interface import UnitInterface, UnitVariable
+from shaftwork.pipeline.arguments import STAND_IN
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.model import Model
@@ -83,7 +84,7 @@ def _dependencies(model: Model, code: CCode) -> dict[str, tuple[str, ...]]:
     """The states and inputs in each rate and output; of a network whose modes change them nothing is told."""
     if model.phased:
         return {}
-    inputs = dict.fromkeys((variable.name for variable in code.inputs), RUNNING)
+    inputs = dict.fromkeys((variable.name for variable in code.inputs), STAND_IN)
     equations = EquationSet(model.with_values(inputs) if inputs else model)
     rates = {state.name: rate for state, rate in zip(equations.rows.states, equations.rows.rates, strict=True)}
     laws = {f"der({name})": rate for name, rate in rates.items()}
@@ -111,8 +112,8 @@ def _interface(
         title=title,
         identifier=code.name,
         token="{" + "-".join((token[:8], token[8:12], token[12:16], token[16:20], token[20:32])) + "}",
-        parameters=_with_values(code.parameters),
-        inputs=_with_values(code.inputs),
+        parameters=tuple(UnitVariable(*variable) for variable in code.parameters),
+        inputs=tuple(UnitVariable(*variable) for variable in code.inputs),
         states=tuple(UnitVariable(v.name, v.unit, 0.0) for v in code.states),
         outputs=tuple(UnitVariable(v.name, v.unit) for v in code.outputs if v.name not in others),
         shown=frozenset(states & {*wanted}),
@@ -120,10 +121,6 @@ def _interface(
         dependencies=dependencies,
         t_end=t_end,
     )
-
-
-def _with_values(variables: Iterable[object]) -> tuple[UnitVariable, ...]:
-    return tuple(UnitVariable(v.name, v.unit, v.value) for v in variables)  # type: ignore[attr-defined]
 
 
 def _sources(unit: UnitInterface, code: CCode, version: str) -> dict[str, str]:
@@ -212,13 +209,8 @@ def _platform(version: str) -> str:
 
 def _write(place: Path, members: Mapping[str, bytes]) -> None:
     """Write the archive, which takes the place of one that was there once it is whole."""
-    draft = place.with_name(f".{place.name[:50]}.{os.getpid()}.part")
-    try:
-        with zipfile.ZipFile(draft, "w", zipfile.ZIP_DEFLATED) as archive:
-            for name, data in members.items():
-                member = zipfile.ZipInfo(name, _DAY)
-                member.external_attr = 0o644 << 16
-                archive.writestr(member, data, zipfile.ZIP_DEFLATED)
-        draft.replace(place)
-    finally:
-        draft.unlink(missing_ok=True)
+    with drafted(place) as draft, zipfile.ZipFile(draft, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in members.items():
+            member = zipfile.ZipInfo(name, _DAY)
+            member.external_attr = 0o644 << 16
+            archive.writestr(member, data, zipfile.ZIP_DEFLATED)

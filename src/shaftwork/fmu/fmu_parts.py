@@ -14,12 +14,26 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import parameter
 from shaftwork.fmu.foreign_unit import FMU, MOST_STATES, ForeignUnit
+from shaftwork.network.netlist import title
 
 _PORTS = tuple(f"x{k}" for k in range(1, MOST_STATES + 1))
 
 
+class _FMUPart(Component):
+    """A part with the states of an FMU inside."""
+
+    fmu: FMU
+    role: ClassVar[Role] = "source"
+    ports: ClassVar = (Port("a"),)
+    signal_ports: ClassVar = frozenset(_PORTS)
+
+    def inner_ports(self) -> tuple[Port, ...]:
+        """Where the states of the FMU are stored."""
+        return tuple(map(Port, _PORTS[: len(self.fmu.states)]))
+
+
 @component
-class FMUTorque(Component):
+class FMUTorque(_FMUPart):
     """A torque on its node that an FMU gives as a function of the speed of the node, of time and of its own states.
 
     Law: tau = gain g(t, x, omega), positive raises the speed of the node, with x' = f(t, x, omega); f and g are those
@@ -31,17 +45,9 @@ class FMUTorque(Component):
     fmu: FMU = parameter("1", "the file, the names of its variables and its values", record=FMU)
     gain: float = parameter("1", "torque on the node over that of the FMU", default=1.0)
 
-    role: ClassVar[Role] = "source"
-    ports: ClassVar = (Port("a"),)
-    signal_ports: ClassVar = frozenset(_PORTS)
-
     def __post_init__(self) -> None:
         super().__post_init__()
         _refuse_wrong(self, ("speed", "torque"))
-
-    def inner_ports(self) -> tuple[Port, ...]:
-        """Where the states of the FMU are stored."""
-        return tuple(map(Port, _PORTS[: len(self.fmu.states)]))
 
     def branches(self, p: Any) -> Iterator[Branch]:
         unit = Handle(ForeignUnit(p.fmu, p.fmu.speed, p.fmu.torque))
@@ -50,7 +56,7 @@ class FMUTorque(Component):
 
 
 @component
-class FMUSpeed(Component):
+class FMUSpeed(_FMUPart):
     """Prescribes the speed of its node as an FMU gives it, from the torque on its shaft, time and its own states.
 
     Law: omega = g(t, x), with x' = f(t, x, tau), where tau is the torque that the node gives to the FMU; as of
@@ -60,10 +66,6 @@ class FMUSpeed(Component):
 
     fmu: FMU = parameter("1", "the file, the names of its variables and its values", record=FMU)
 
-    role: ClassVar[Role] = "source"
-    ports: ClassVar = (Port("a"),)
-    signal_ports: ClassVar = frozenset(_PORTS)
-
     def __post_init__(self) -> None:
         super().__post_init__()
         _refuse_wrong(self, ("torque", "speed"))
@@ -72,10 +74,6 @@ class FMUSpeed(Component):
                 f"FMUSpeed '{self.name}': the speed of the FMU '{self.fmu.path.name}' depends on its input at once (by "
                 "its ModelStructure), which makes an algebraic loop. Take an FMUTorque, or give the FMU an inertia."
             )
-
-    def inner_ports(self) -> tuple[Port, ...]:
-        """Where the states of the FMU are stored."""
-        return tuple(map(Port, _PORTS[: len(self.fmu.states)]))
 
     def branches(self, p: Any) -> Iterator[Branch]:
         unit = Handle(ForeignUnit(p.fmu, p.fmu.torque, p.fmu.speed))
@@ -98,10 +96,10 @@ def _states(unit: Handle, fmu: FMU, reads: Expr) -> Iterator[Branch]:
 def _refuse_wrong(part: Any, order: tuple[str, str]) -> None:
     fmu = part.fmu
     if (objection := part.declared["fmu"].magnitude(fmu)[1]) is not None:
-        raise ParameterError(f"{type(part).__name__} '{part.name}': fmu {objection}.")
+        raise ParameterError(f"{title(part)}: fmu {objection}.")
     reads, gives = (getattr(fmu, name) for name in order)
     if fmu.gives(reads) or not fmu.gives(gives):
         raise ParameterError(
-            f"{type(part).__name__} '{part.name}': of the FMU '{fmu.path.name}' {order[0]} = '{reads}' must be an "
+            f"{title(part)}: of the FMU '{fmu.path.name}' {order[0]} = '{reads}' must be an "
             f"input and {order[1]} = '{gives}' an output."
         )

@@ -104,30 +104,25 @@ def _add_units(root: Element, unit: UnitInterface) -> None:
 def _variables(unit: UnitInterface, version: str) -> Iterator[Element]:
     make = _scalar_2 if version == "2.0" else _scalar_3
     references = unit.references
-    yield make("time", 0, UnitVariable("time", "s"), {"causality": "independent", "variability": "continuous"}, {})
+    moving = {"variability": "continuous"}
+    calculated = {**moving, "initial": "calculated"}
+    yield make(0, UnitVariable("time", "s"), {"causality": "independent", **moving})
     for variable in unit.parameters:
         roles = {"causality": "parameter", "variability": "tunable", "initial": "exact"}
-        yield make(variable.name, references[variable.name], variable, roles, {})
+        yield make(references[variable.name], variable, roles)
     for variable in unit.inputs:
-        roles = {"causality": "input", "variability": "continuous"}
-        yield make(variable.name, references[variable.name], variable, roles, {})
+        yield make(references[variable.name], variable, {"causality": "input", **moving})
     for variable in unit.states:
         causality = "output" if variable.name in unit.shown else "local"
-        roles = {"causality": causality, "variability": "continuous", "initial": "exact"}
-        yield make(variable.name, references[variable.name], variable, roles, {})
+        yield make(references[variable.name], variable, {"causality": causality, **moving, "initial": "exact"})
     for state, variable in zip(unit.states, unit.rates, strict=True):
-        reference = references[state.name]
-        derivative = reference + 1 if version == "2.0" else reference  # FMI 2.0 counts variables from 1
-        roles = {"causality": "local", "variability": "continuous", "initial": "calculated"}
-        yield make(variable.name, references[variable.name], variable, roles, {"derivative": str(derivative)})
+        derivative = references[state.name] + (version == "2.0")  # FMI 2.0 counts variables from 1
+        yield make(references[variable.name], variable, {"causality": "local", **calculated}, derivative)
     for variable in unit.outputs:
-        roles = {"causality": "output", "variability": "continuous", "initial": "calculated"}
-        yield make(variable.name, references[variable.name], variable, roles, {})
-    if version == "3.0":
-        for k in range(unit.indicators):
-            variable = UnitVariable(_indicator_name(unit, k), "1")
-            roles = {"causality": "local", "variability": "continuous", "initial": "calculated"}
-            yield make(variable.name, len(references) + 1 + k, variable, roles, {})
+        yield make(references[variable.name], variable, {"causality": "output", **calculated})
+    for k in range(unit.indicators if version == "3.0" else 0):
+        variable = UnitVariable(_indicator_name(unit, k), "1")
+        yield make(len(references) + 1 + k, variable, {"causality": "local", **calculated})
 
 
 def _indicator_name(unit: UnitInterface, number: int) -> str:
@@ -135,31 +130,22 @@ def _indicator_name(unit: UnitInterface, number: int) -> str:
     return name if name not in unit.references else f"{name}_"
 
 
-def _scalar_2(
-    name: str, reference: int, variable: UnitVariable, roles: dict[str, str], extra: dict[str, str]
-) -> Element:
-    element = Element("ScalarVariable", {"name": name, "valueReference": str(reference), **_said(variable), **roles})
-    SubElement(element, "Real", {**_unit_of(variable), **_start(variable), **extra})
+def _scalar_2(reference: int, variable: UnitVariable, roles: dict[str, str], derivative: int | None = None) -> Element:
+    element = Element("ScalarVariable", {"name": variable.name, "valueReference": str(reference), **roles})
+    SubElement(element, "Real", _numbers(variable, derivative))
     return element
 
 
-def _scalar_3(
-    name: str, reference: int, variable: UnitVariable, roles: dict[str, str], extra: dict[str, str]
-) -> Element:
-    attributes = {"name": name, "valueReference": str(reference), **_said(variable), **roles}
-    return Element("Float64", {**attributes, **_unit_of(variable), **_start(variable), **extra})
+def _scalar_3(reference: int, variable: UnitVariable, roles: dict[str, str], derivative: int | None = None) -> Element:
+    attributes = {"name": variable.name, "valueReference": str(reference), **roles}
+    return Element("Float64", attributes | _numbers(variable, derivative))
 
 
-def _said(variable: UnitVariable) -> dict[str, str]:
-    return {"description": variable.meaning} if variable.meaning else {}
-
-
-def _unit_of(variable: UnitVariable) -> dict[str, str]:
-    return {} if variable.unit == "1" else {"unit": variable.unit}
-
-
-def _start(variable: UnitVariable) -> dict[str, str]:
-    return {} if variable.start is None else {"start": repr(variable.start)}
+def _numbers(variable: UnitVariable, derivative: int | None) -> dict[str, str]:
+    """Attributes of the type: its unit, its start value, and of a rate the variable whose derivative it is."""
+    attributes = {} if variable.unit == "1" else {"unit": variable.unit}
+    attributes |= {} if variable.start is None else {"start": repr(variable.start)}
+    return attributes | ({} if derivative is None else {"derivative": str(derivative)})
 
 
 def _unknowns(unit: UnitInterface) -> tuple[list[str], list[str], list[str]]:

@@ -53,13 +53,11 @@ class UnitVariable:
         name: "J2.omega".
         unit: SI unit.
         start: value before the start; None of what follows from others.
-        meaning: a few words.
     """
 
     name: str
     unit: str
     start: float | None = None
-    meaning: str = ""
 
 
 @dataclass(frozen=True)
@@ -98,18 +96,20 @@ class UnitInterface:
         """Derivatives of the states."""
         return tuple(UnitVariable(f"der({state.name})", _per_second(state.unit)) for state in self.states)
 
+    @property
+    def _variables(self) -> tuple[UnitVariable, ...]:
+        return (*self.parameters, *self.inputs, *self.states, *self.rates, *self.outputs)
+
     @cached_property
     def references(self) -> dict[str, int]:
         """Value references by name."""
-        groups = (self.parameters, self.inputs, self.states, self.rates, self.outputs)
-        return {variable.name: k for k, variable in enumerate((v for group in groups for v in group), 1)}
+        return {variable.name: k for k, variable in enumerate(self._variables, 1)}
 
     @cached_property
     def units(self) -> tuple[str, ...]:
         """All units that occur but that of pure numbers, in the order of the variables."""
-        groups = (self.parameters, self.inputs, self.states, self.rates, self.outputs)
-        units = ("s", *(v.unit for group in groups for v in group))
-        return tuple(unit for unit in dict.fromkeys(units) if unit != "1")
+        units = dict.fromkeys(("s", *(variable.unit for variable in self._variables)))
+        return tuple(unit for unit in units if unit != "1")
 
     @property
     def convention(self) -> str:

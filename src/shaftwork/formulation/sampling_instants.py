@@ -6,6 +6,7 @@ import math
 
 from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError
 from shaftwork.formulation.form import StateForm
+from shaftwork.network.netlist import title
 
 EARLY = 4
 """So many units in the last place an instant is earlier than k T: rounding moves k T / T and the like by less."""
@@ -52,7 +53,7 @@ def refuse_sampled(form: StateForm, what: str, kind: type[ShaftworkError] = Simu
     for part in form.graph.parts:
         if (sampler := part.component.sampler()) is not None:
             raise kind(
-                f"{type(part.component).__name__} '{part.name}' acts every {sampler.period:g} s and holds its output "
+                f"{title(part.component)} acts every {sampler.period:g} s and holds its output "
                 f"in between, so {what}. Take a continuous controller in its place (without sample_time), or simulate "
                 "the motion."
             )

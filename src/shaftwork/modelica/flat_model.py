@@ -26,7 +26,7 @@ from shaftwork.modelica.modelica_expressions import (
     unit,
 )
 from shaftwork.network.graph import CircuitGraph, GraphPart, resolve
-from shaftwork.network.netlist import Netlist
+from shaftwork.network.netlist import Netlist, title
 
 _COMPONENT_FORM = "The form 'component' has it."
 
@@ -39,7 +39,7 @@ def in_one_mode(netlist: Netlist, graph: CircuitGraph) -> Netlist:
     """
     changing = {part.name: part for part in graph.parts if part.modes}
     if rigid := [part for part in changing.values() if any(modes.law is None for modes in part.modes)]:
-        names = ", ".join(f"{type(part.component).__name__} '{part.name}'" for part in rigid)
+        names = ", ".join(title(part.component) for part in rigid)
         raise CompileError(
             f"'{netlist.name}' in one set of equations: {names} would change them during the motion. {_COMPONENT_FORM}"
         )

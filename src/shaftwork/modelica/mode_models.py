@@ -22,6 +22,7 @@ from shaftwork.modelica.modelica_expressions import ModelicaPrinter
 from shaftwork.modelica.part_models import PartModel
 from shaftwork.network.graph import GraphPart, resolve
 from shaftwork.network.kinds import Kind
+from shaftwork.network.netlist import title
 from shaftwork.network.templates import BranchTemplate, make_template
 
 _NEXT = "Simplify the part, or export the circuit or the C code of the network."
@@ -43,11 +44,9 @@ def part_model(form: StateForm, part: GraphPart) -> PartModel:
             return _FrictionModel(form, part)
         if names in ({"free", "locked"}, {"open", "closed", "over"}):
             return _FreewheelModel(form, part) if "free" in names else _SwitchModel(form, part)
-    raise CompileError(f"{_title(part)} changes its mode in a way that is not written in Modelica. {_hint(part)}")
-
-
-def _title(part: GraphPart) -> str:
-    return f"{type(part.component).__name__} '{part.name}'"
+    raise CompileError(
+        f"{title(part.component)} changes its mode in a way that is not written in Modelica. {_hint(part)}"
+    )
 
 
 def _hint(part: GraphPart) -> str:

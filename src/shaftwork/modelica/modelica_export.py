@@ -17,7 +17,7 @@ from shaftwork.formulation.form import StateForm
 from shaftwork.formulation.sampling_instants import refuse_sampled
 from shaftwork.modelica.component_writer import component_text
 from shaftwork.modelica.flat_model import flat_text, in_one_mode
-from shaftwork.network.netlist import Netlist
+from shaftwork.network.netlist import Netlist, title
 
 Form = Literal["component", "flat"]
 Library = Literal["standard", "inline"]
@@ -83,8 +83,7 @@ def _refuse_impulses(form: StateForm) -> None:
         for time in breakpoints(law):
             before, after = (float(law.subs(TIME, time + side * _BESIDE * max(1, abs(time)))) for side in (-1, 1))
             if time > 0 and abs(after - before) > 1e-6 * max(abs(after), abs(before)):
-                part = form.graph.part_of(source)
                 raise CompileError(
-                    f"{type(part.component).__name__} '{part.name}' jumps at t = {time:g} s, and gives an impulse to "
+                    f"{title(form.graph.part_of(source).component)} jumps at t = {time:g} s, and gives an impulse to "
                     "what is rigidly joined to it, which rates do not hold. Write the jump as a Ramp."
                 )

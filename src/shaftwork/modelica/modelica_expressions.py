@@ -17,6 +17,7 @@ from shaftwork.codegen.code import RealNumbers
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.noise import normal
 from shaftwork.core.errors import CompileError
+from shaftwork.network.netlist import unused
 
 KEYWORDS = frozenset(
     re.findall(
@@ -237,10 +238,7 @@ class Identifiers:
         """A name that nothing has yet, made from one: letters, digits and underscores alone."""
         plain = re.sub(r"\W", "_", name, flags=re.ASCII)
         plain = plain if re.match(r"[A-Za-z]", plain) else f"x_{plain}"
-        candidate, count = plain, 1
-        while candidate in self._taken:
-            count += 1
-            candidate = f"{plain}_{count}"
+        candidate = unused(plain, self._taken, "{}_{}")
         self._taken.add(candidate)
         return candidate
 

@@ -15,6 +15,7 @@ from shaftwork.modelica.modelica_expressions import Identifiers, ModelicaPrinter
 from shaftwork.modelica.standard_classes import CONNECTORS
 from shaftwork.network.graph import GROUND, GraphBranch, GraphPart, resolve, signals_of
 from shaftwork.network.kinds import Kind
+from shaftwork.network.netlist import title
 
 INTEGRALS = {ROTATION: "phi", TRANSLATION: "s", ELECTRICAL: "psi"}
 FLOWS = {ROTATION: "tau", TRANSLATION: "f", ELECTRICAL: "i"}
@@ -31,7 +32,7 @@ class PartModel:
     def __init__(self, form: StateForm, part: GraphPart) -> None:
         self.form, self.graph, self.part = form, form.graph, part
         component = part.component
-        self.title = f"{type(component).__name__} '{part.name}'"
+        self.title = title(component)
         self.branches = [self.graph.branches[k] for k in part.branches]
         self.domains: dict[str, Domain] = {}
         for port in (*component.ports, *component.inner_ports()):

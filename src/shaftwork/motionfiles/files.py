@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from shaftwork.core.errors import ModelFileError, ParameterError, imported
 from shaftwork.core.files import drafted, in_a_folder
-from shaftwork.motionfiles.record import ARRIVING, Call, record_text
+from shaftwork.motionfiles.record import ARRIVING, record_text
 from shaftwork.results.data_frames import to_pandas, to_xarray
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
+
+if TYPE_CHECKING:
+    from shaftwork.pipeline.motion_start import Repetition
 
 RECORD = "shaftwork"
 """What a file says of the motion: a variable of netCDF, as attributes have at most 64 kB; an attribute of Parquet."""
@@ -22,7 +25,7 @@ SLASH, INSTEAD = "/", "\N{DIVISION SLASH}"
 Columns = Mapping[str, Array]
 
 
-def write_motion(call: Call, motion: Solution, path: Any, names: Sequence[str]) -> None:
+def write_motion(call: Repetition, motion: Solution, path: Any, names: Sequence[str]) -> None:
     """Write a motion; see `Solution.save`."""
     place = in_a_folder(path)
     writer, _ = _format_of(place)

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from shaftwork.modelfiles.storage import netlist_text
-from shaftwork.network.netlist import Netlist
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
+
+if TYPE_CHECKING:
+    from shaftwork.pipeline.motion_start import Repetition
 
 FORMAT = 1
 """Version of what is written here; a reader refuses newer ones."""
@@ -21,41 +23,7 @@ PLAIN = ("name", "states", "engine", "why", "statistics", "events", "parameters"
 """Fields of a solution that stand in a file as they are."""
 
 
-class Call(Protocol):
-    """The call that led to a motion, as `pipeline` has it, which knows this room by its door alone."""
-
-    @property
-    def rebuild(self) -> Any:
-        """Has the options of `Network.compile`: `angles` and `accepted`."""
-        ...
-
-    @property
-    def netlist(self) -> Netlist:
-        """The network."""
-        ...
-
-    @property
-    def demand(self) -> Any:
-        """What was asked."""
-        ...
-
-    @property
-    def engine(self) -> str:
-        """That was taken."""
-        ...
-
-    @property
-    def values(self) -> Mapping[str, float]:
-        """Parameters that differ."""
-        ...
-
-    @property
-    def initial(self) -> Any:
-        """Start values, or the end of a motion before, which has `waves`, `modes` and `parameters`."""
-        ...
-
-
-def record_text(motion: Solution, call: Call) -> str:
+def record_text(motion: Solution, call: Repetition) -> str:
     """What a file says of a motion.
 
     Raises:
@@ -67,21 +35,20 @@ def record_text(motion: Solution, call: Call) -> str:
     return json.dumps(said, default=_as_plain, allow_nan=False)
 
 
-def _call(call: Call, t: Array) -> dict[str, Any]:
-    initial = call.initial
-    if getattr(initial, "waves", None) is not None:
-        return {"why": "it went on from a motion with waves on their way through shafts"}
+def _call(call: Repetition, t: Array) -> dict[str, Any]:
     demand = call.demand
+    compiler: Any = call.rebuild
+    initial: Any = call.initial  # values, or the end of a motion before
     times = "t" if demand.t_eval is not None and np.array_equal(demand.t_eval, t) else demand.t_eval
-    before = (
-        {"t": initial.t, "read": initial.read, "modes": initial.modes, "parameters": initial.parameters}
-        if hasattr(initial, "waves")
-        else None
-    )
+    before = None
+    if hasattr(initial, "waves"):
+        if initial.waves is not None:
+            return {"why": "it went on from a motion with waves on their way through shafts"}
+        before = {"t": initial.t, "read": initial.read, "modes": initial.modes, "parameters": initial.parameters}
     return {
         "network": netlist_text(call.netlist),
-        "angles": call.rebuild.angles,
-        "accepted": call.rebuild.accepted,
+        "angles": compiler.angles,
+        "accepted": compiler.accepted,
         "span": demand.span,
         "rtol": demand.rtol,
         "atol": demand.atol,

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import cached_property
-from itertools import chain
+from itertools import chain, count
 from typing import Any, Literal, Self, TypeVar, get_args, overload
 
 from shaftwork.components.base import Component
@@ -183,6 +183,12 @@ def is_name(value: object) -> bool:
 def title(part: Component) -> str:
     """A part as messages name it: "Gear 'stage 1'"."""
     return f"{type(part).__name__} '{part.name}'"
+
+
+def unused(name: str, taken: Container[str], pattern: str = "{} {}") -> str:
+    """A name, or with the first number behind it, from 2, that makes it another than those that are taken."""
+    numbered = chain((name,), (pattern.format(name, number) for number in count(2)))
+    return next(candidate for candidate in numbered if candidate not in taken)
 
 
 def listed(names: Sequence[str], most: int = 6) -> str:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import count
 
 from shaftwork.components.base import Component
 from shaftwork.components.mechanics import Damper, Gear, Inertia, PlanetaryGear, Spring
-from shaftwork.network.netlist import REFERENCE
+from shaftwork.network.netlist import REFERENCE, unused
 from shaftwork.pipeline.network import Network
 
 Wired = tuple[Component, tuple[str, ...]]
@@ -112,8 +111,7 @@ def network_of_elements(name: str, elements: Sequence[Element]) -> Network:
 
 def unique(name: str, taken: set[str]) -> str:
     """The name, or with the first number behind it that makes it a new one; it is taken from then on."""
-    names = (name if number == 1 else f"{name} ({number})" for number in count(1))
-    free = next(candidate for candidate in names if candidate not in taken)
+    free = unused(name, taken, "{} ({})")
     taken.add(free)
     return free
 

@@ -27,6 +27,8 @@ OUTPUTS = 1001
 """Output times where the user gives none."""
 NOMINAL = 1e-3
 """Absolute tolerance as a fraction of the relative one, for a speed of 1 rad/s (m/s, V)."""
+STAND_IN = 1.0
+"""The value that stands for an input while equations are made: an exact zero would leave it out of them."""
 OutputTimes = int | Sequence[float] | Array | Literal["steps"] | None
 Given = Mapping[str, float] | None
 """Values by name."""

@@ -2,7 +2,7 @@
 
 `deck` writes: `spice_elements` has an element for each branch, `smoothed_modes` a law in place of modes, `spice_laws`
 expressions as ngspice reads them. `reader` reads: `netlist_lines` splits a text into lines, `devices` makes parts of
-them, `waveforms` laws of sources, `lcapy_lines` what lcapy writes otherwise.
+them, `waveforms` laws of sources, `lcapy_devices` what lcapy writes otherwise.
 """
 
 from __future__ import annotations

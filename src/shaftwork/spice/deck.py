@@ -60,7 +60,9 @@ def deck(model: Model, t_end: float, step: float | None, initial: Any) -> str:
             problems.append(_problem(part, error, form))
     if problems:
         raise NetworkError(f"'{model.name}' cannot be written for SPICE", tuple(problems))
-    lines = [*_parameters(lines), *lines, *_rest(elements), *_clocks(elements)]
+    rest = _section("Angles (rad), positions (m) and accelerations that laws read", elements.rest())
+    ends = "Switches from 0 to 1 at a time, and corners where laws bend: steps of ngspice end there"
+    lines = [*_parameters(lines), *lines, *rest, *_section(ends, elements.clocks())]
     head = HEAD.format(name=" ".join(model.name.split())).splitlines()
     return "\n".join(_wrapped([*head, *lines, *_analysis(elements, form, end, longest)])) + "\n"
 
@@ -122,34 +124,20 @@ def _parameters(lines: list[str]) -> Iterator[str]:
             yield f".param {name}={value!r} ; {meaning}"
 
 
-def _rest(elements: Elements) -> Iterator[str]:
-    lines = [*elements.rest()]
-    if lines:
-        yield from ("", "* Angles (rad), positions (m) and accelerations that laws read", *lines)
-
-
-def _clocks(elements: Elements) -> Iterator[str]:
-    lines = [*elements.clocks()]
-    if lines:
-        yield from (
-            "",
-            "* Switches from 0 to 1 at a time, and corners where laws bend: steps of ngspice end there",
-            *lines,
-        )
+def _section(about: str, lines: Iterator[str]) -> list[str]:
+    """Lines below a comment that says what they are; nothing where there are none."""
+    section = [*lines]
+    return ["", f"* {about}", *section] if section else []
 
 
 def _analysis(elements: Elements, form: StateForm, t_end: float, step: float) -> Iterator[str]:
     yield ""
     yield ".options reltol=1e-6 abstol=1e-12 vntol=1e-9 chgtol=1e-18 method=trap"
     yield f".tran {step!r} {t_end!r} 0 {step!r} uic"
-    outer = dict.fromkeys(node for part in form.graph.parts for node in _outer(part))
+    outer = dict.fromkeys(part.nodes[port.name] for part in form.graph.parts for port in part.component.ports)
     names = [elements.node(number) for number in outer if form.graph.node_name(number) != REFERENCE]
     yield f".print tran {' '.join(f'v({name})' for name in names)}"
     yield ".end"
-
-
-def _outer(part: GraphPart) -> Iterator[int]:
-    return (part.nodes[port.name] for port in part.component.ports)
 
 
 def _wrapped(lines: list[str]) -> Iterator[str]:

@@ -88,8 +88,8 @@ class Devices:
             "s": self._switch,
         }
         if kind not in makers:
-            known = ", ".join(sorted(one.upper() for one in (*makers, "k", "x")))
-            raise line.error(f"there is no part for elements of type {kind.upper()} here. Known are {known}")
+            kinds = ", ".join(sorted(one.upper() for one in (*makers, "k", "x")))
+            raise line.error(f"there is no part for elements of type {kind.upper()} here. Known are {kinds}")
         if len(line.words) < ENDS[kind] + 2:
             raise line.error(f"it has a name, {ENDS[kind]} nodes and a value; some of that is missing")
         makers[kind](line, f"{line.prefix}{line.words[0]}")
@@ -197,20 +197,21 @@ class Devices:
             raise line.error(f"'{text}' must be above zero")
         return value
 
-    def _model(self, line: NetlistLine, name: str, kind: str, known: Mapping[str, float]) -> dict[str, float]:
-        """The parameters of a model; those that are not known must be zero."""
+    def _model(self, line: NetlistLine, name: str, kind: str, defaults: Mapping[str, float]) -> dict[str, float]:
+        """The parameters of a model; those that have no default must be zero."""
         scoped = next((one for one in line.in_scope(name) if one in self.models), None)
         if scoped is None:
             there = first_few([*self.models]) or "none"
             raise line.error(f"there is no .model '{name}'. Given are: {there}")
-        origin, given, pairs = self.models[scoped]
-        if given != kind:
-            raise line.error(f".model {name} is of type '{given}', not '{kind}'")
+        origin, other, pairs = self.models[scoped]
+        if other != kind:
+            raise line.error(f".model {name} is of type '{other}', not '{kind}'")
         unread = DEAD_WITHOUT_CAPACITY if kind == "d" and "cjo" not in pairs and "cj0" not in pairs else ()
         read = {key: self.values.number(origin, text) for key, text in pairs.items() if key not in unread}
-        if strange := [key for key, value in read.items() if key not in known and value]:
-            raise origin.error(f"{', '.join(strange)} of a model of type {kind} is not read. Known: {', '.join(known)}")
-        return {**known, **{key: read[key] for key in known if key in read}}
+        if strange := [key for key, value in read.items() if key not in defaults and value]:
+            names = ", ".join(defaults)
+            raise origin.error(f"{', '.join(strange)} of a model of type {kind} is not read. Known: {names}")
+        return {key: read.get(key, value) for key, value in defaults.items()}
 
     def _diode(self, line: NetlistLine, name: str) -> None:
         p, n = self._ends(line)

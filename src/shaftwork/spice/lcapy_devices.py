@@ -15,25 +15,11 @@ from shaftwork.components.laws import t
 from shaftwork.spice.devices import Devices
 from shaftwork.spice.netlist_lines import NetlistLine
 
-LONG_NAMES: tuple[str, ...] = (
-    "TF",
-    "SW",
-    "NR",
-    "AM",
-    "VM",
-    "GY",
-    "TP",
-    "TL",
-    "TR",
-    "RL",
-    "CPE",
-    "REL",
-    "BAT",
-    "FB",
-    "VCVS",
-    "VCCS",
+LONG_NAMES = (
+    *("TF", "SW", "NR", "AM", "VM", "GY", "TP", "TL", "TR", "RL", "CPE", "REL", "BAT", "FB", "VCVS", "VCCS", "CCCS"),
+    *("CCVS", "Cable", "ANT", "SP", "BL", "MX", "XT", "MISC", "MT", "ADC", "DAC", "RV", "TV", "FS"),
 )
-LONG_NAMES += ("CCCS", "CCVS", "Cable", "ANT", "SP", "BL", "MX", "XT", "MISC", "MT", "ADC", "DAC", "RV", "TV", "FS")
+"""Types of elements with more than one letter."""
 DRAWN = ("A", "O", "P", "VM")
 """What is drawn, and lets no current pass."""
 JOINED = ("W", "AM")
@@ -105,8 +91,8 @@ class LcapyDevices(Devices):
         }
         kind = kind_of(line.words[0])
         if kind not in makers:
-            known = ", ".join((*makers, "K", "W"))
-            raise line.error(f"there is no part for elements of type {kind} here. Known are {known}")
+            kinds = ", ".join((*makers, "K", "W"))
+            raise line.error(f"there is no part for elements of type {kind} here. Known are {kinds}")
         if len(line.words) < 3:
             raise line.error("it has a name and two nodes; some of that is missing")
         makers[kind](line, line.words[0])

@@ -16,23 +16,10 @@ _WORD = re.compile(r"\{[^{}]*\}|'[^']*'|\"[^\"]*\"|[^\s(),={}'\"]+|[=(){}'\"]")
 _ELEMENT = re.compile(r"[rlcvi]\w*\s+\S+\s+\S+\s+(?:dc\s+)?[-+.\d]\S*$", re.IGNORECASE)
 ENDS = {"r": 2, "l": 2, "c": 2, "v": 2, "i": 2, "d": 2, "e": 4, "g": 4, "s": 4, "t": 4, "f": 2, "h": 2, "k": 0}
 """How many nodes an element has behind its name, by its first letter."""
-ANALYSES: tuple[str, ...] = (
-    "ac",
-    "dc",
-    "disto",
-    "four",
-    "measure",
-    "meas",
-    "noise",
-    "op",
-    "options",
-    "option",
-    "opt",
-    "plot",
-    "print",
+ANALYSES = (
+    *("ac", "dc", "disto", "fft", "four", "hb", "lin", "meas", "measure", "nodeset", "noise", "op", "opt", "option"),
+    *("options", "plot", "print", "probe", "pss", "pz", "save", "sens", "step", "tf", "title", "width"),
 )
-ANALYSES += ("probe", "pss", "pz", "save", "sens", "tf", "title", "width", "nodeset")
-ANALYSES += ("fft", "hb", "lin", "step")
 """Commands that change nothing in the circuit and its motion, which are left out."""
 
 
@@ -40,6 +27,7 @@ class LineError(ModelFileError):
     """What cannot be read in a line."""
 
     def __init__(self, line: NetlistLine, why: str) -> None:
+        self.number = line.number
         text = line.text if len(line.text) <= 80 else f"{line.text[:77]}..."
         super().__init__(f"line {line.number} '{text}': {why}")
 

@@ -6,6 +6,7 @@ import os
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, Literal
 
@@ -113,9 +114,9 @@ def read(
     title, text = ("netlist", source) if isinstance(source, str) else (os.fspath(source), _text_of(Path(source)))
     if dialect not in (None, "spice", "lcapy"):
         raise ParameterError(f"dialect = {dialect!r} must be 'spice', 'lcapy' or None.")
-    given = {str(name): in_si(f"values['{name}']", value) for name, value in (values or {}).items()}
+    numbers = {str(name): in_si(f"values['{name}']", value) for name, value in (values or {}).items()}
     try:
-        return _NetlistReader(text, given, dialect or _dialect_of(text), ideal_diodes).circuit(Path(title).stem)
+        return _NetlistReader(text, numbers, dialect or _dialect_of(text), ideal_diodes).circuit(Path(title).stem)
     except ModelFileError as error:
         raise ModelFileError(f"{title}: {error}") from None
 
@@ -137,9 +138,9 @@ def _dialect_of(text: str) -> Dialect:
 class _NetlistReader:
     """Reads one netlist."""
 
-    def __init__(self, text: str, given: Mapping[str, float], dialect: Dialect, ideal_diodes: bool) -> None:  # noqa: FBT001
+    def __init__(self, text: str, values: Mapping[str, float], dialect: Dialect, ideal_diodes: bool) -> None:  # noqa: FBT001
         self._lcapy, self._ideal_diodes = dialect == "lcapy", ideal_diodes
-        names = given if self._lcapy else {name.lower(): value for name, value in given.items()}
+        names = values if self._lcapy else {name.lower(): value for name, value in values.items()}
         self._given, self._values = names, NetlistValues(names, lcapy=self._lcapy)
         self._title = "" if self._lcapy else (text.splitlines() or [""])[0].strip().lstrip("*").strip()
         lines = lines_of(text, lcapy=self._lcapy)
@@ -156,13 +157,8 @@ class _NetlistReader:
         for line in (line for line in self._lines if line.command[0] == "."):
             self._attempt(line, self._command)
         devices = self._devices(elements)
-        plain = [line for line in elements if self._kind(line) not in ("K", *_FOLLOWERS)]
-        for line in plain:
-            self._attempt(line, devices.add)
-        for line in (line for line in elements if self._kind(line) in _FOLLOWERS):
-            self._attempt(line, devices.add)
-        for line in (line for line in elements if self._kind(line) == "K"):
-            self._attempt(line, devices.couple)
+        for line in sorted(elements, key=lambda line: _turn(self._kind(line))):
+            self._attempt(line, devices.couple if self._kind(line) == "K" else devices.add)
         begins = self._lcapy or self._uic is not None  # otherwise SPICE begins in the steady state, whatever IC says
         initial = {**devices.initial, **self._voltages(devices.placed)} if begins else {}
         if self._start_voltages and not begins:
@@ -261,7 +257,7 @@ class _NetlistReader:
         Raises:
             ModelFileError: there is any; lists the lines.
         """
-        faults = [*dict.fromkeys(map(str, sorted(self._faults, key=_line_number)))]
+        faults = [*dict.fromkeys(map(str, sorted(self._faults, key=attrgetter("number"))))]
         if faults:
             rest = f"\n  and {len(faults) - MOST_FAULTS} lines more" if len(faults) > MOST_FAULTS else ""
             count = "a line is" if len(faults) == 1 else f"{len(faults)} lines are"
@@ -278,8 +274,9 @@ class _NetlistReader:
 _FOLLOWERS = ("F", "H", "CCCS", "CCVS")
 
 
-def _line_number(fault: LineError) -> int:
-    return int(str(fault).split()[1])
+def _turn(kind: str) -> int:
+    """When an element is made: what follows a current after all sources, what couples inductors after these."""
+    return 2 if kind == "K" else int(kind in _FOLLOWERS)
 
 
 def _open_ends(placed: list[Placed]) -> Iterator[Placed]:

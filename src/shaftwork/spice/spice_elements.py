@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 
 from sympy import Expr, Float, Symbol
@@ -11,6 +12,7 @@ from shaftwork.components.discontinuities import breakpoints
 from shaftwork.components.laws import replaced, t
 from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, readings_of
 from shaftwork.network.kinds import Kind
+from shaftwork.network.netlist import by_part, unused
 from shaftwork.spice.smoothed_modes import SmoothedPart
 from shaftwork.spice.spice_laws import of_time, printed, waveform
 
@@ -22,18 +24,15 @@ class Labels:
 
     def __init__(self) -> None:
         self._labels: dict[tuple[str, str, int], str] = {}
-        self._taken = {*RESERVED}  # only asked for membership
+        self._taken = dict[str, set[str]]()  # only asked for membership
 
     def of(self, kind: str, name: str, key: int = 0) -> str:
         """The label of a name; the same name and key of the same kind have the same one."""
         if (kind, name, key) not in self._labels:
-            plain = "".join(sign if sign.isascii() and sign.isalnum() else "_" for sign in name).lower() or "n"
-            label, count = plain, 1
-            while f"{kind}{label}" in self._taken or label in RESERVED:
-                count += 1
-                label = f"{plain}_{count}"
-            self._taken.add(f"{kind}{label}")
-            self._labels[kind, name, key] = label
+            plain = re.sub("[^A-Za-z0-9]", "_", name).lower() or "n"
+            taken = self._taken.setdefault(kind, {*RESERVED})
+            self._labels[kind, name, key] = unused(plain, taken, "{}_{}")
+            taken.add(self._labels[kind, name, key])
         return self._labels[kind, name, key]
 
 
@@ -60,7 +59,7 @@ class Elements:
     ) -> None:
         self._graph, self._parts, self._redundant, self._stored = graph, parts, redundant, stored
         self._t_end, self._edge = t_end, edge
-        self._labels = Labels()
+        self._labels, self._parameters_of = Labels(), by_part(graph.parameters)
         self._measured = frozenset(
             reading.of
             for branch in graph.branches
@@ -109,8 +108,12 @@ class Elements:
 
     def _is_end_of_line(self, branch: GraphBranch) -> bool:
         """Whether it is one of the four branches of a line other than the first."""
-        of_line = [k for k in self._graph.part_of(branch.index).branches if self._graph.branches[k].template.line]
+        of_line = self._of_line(branch)
         return branch.index in of_line and of_line.index(branch.index) % 4 > 0
+
+    def _of_line(self, branch: GraphBranch) -> list[int]:
+        """The branches of lines in its part."""
+        return [k for k in self._graph.part_of(branch.index).branches if self._graph.branches[k].template.line]
 
     def _of_branch(self, branch: GraphBranch, law: Expr | None) -> Iterator[str]:
         template = branch.template
@@ -119,15 +122,15 @@ class Elements:
             return
         label, plus, minus = self._element(branch), self.node(branch.plus), self.node(branch.minus)
         start = self._stored.get(branch.index, 0.0)
-        given = f" IC={start!r}" if start else ""
+        condition = f" IC={start!r}" if start else ""
         if branch.index in self._measured:  # laws read its current, that of a source of zero volts
             yield f"V{label}_i {plus} {label}_i 0"
             plus = f"{label}_i"
         match template.kind:
             case Kind.ACROSS_STORE:
-                yield f"C{label} {plus} {minus} {float(law)!r}{given}"
+                yield f"C{label} {plus} {minus} {float(law)!r}{condition}"
             case Kind.THROUGH_STORE:
-                yield f"L{label} {plus} {minus} {1 / float(law)!r}{given}"
+                yield f"L{label} {plus} {minus} {1 / float(law)!r}{condition}"
             case Kind.CONDUCTANCE if template.line is not None:
                 yield self._line(branch)
             case Kind.CONDUCTANCE:
@@ -167,7 +170,7 @@ class Elements:
             yield f"F{label}{count} {ends} V{label} {through[k + 1] / through[0]!r}"
 
     def _line(self, branch: GraphBranch) -> str:
-        of_line = [k for k in self._graph.part_of(branch.index).branches if self._graph.branches[k].template.line]
+        of_line = self._of_line(branch)
         far = self._graph.branches[of_line[of_line.index(branch.index) + 2]]
         assert branch.template.line is not None  # noqa: S101 (asked for before)
         numbers = self._parameters(self._part(branch))
@@ -239,8 +242,7 @@ class Elements:
         return self._graph.parts[branch.part].name
 
     def _parameters(self, name: str) -> Mapping[str, float]:
-        owners = ((*key.rpartition("."), value) for key, value in self._graph.parameters.items())
-        return {parameter: value for owner, _, parameter, value in owners if owner == name}
+        return self._parameters_of.get(name, {})
 
     def _in_numbers(self, law: Expr, numbers: Mapping[str, float]) -> Expr:
         values = {symbol: Float(numbers[symbol.name]) for symbol in law.free_symbols if symbol.name in numbers}

@@ -158,9 +158,10 @@ def _without_jumps(law: Any, switched: Callable[[Any], Expr | None]) -> Any:
     if isinstance(law, sympy.Heaviside):
         step = switched(sympy.Gt(law.args[0], 0, evaluate=False))
         return law if step is None else step
-    args = [_without_jumps(arg, switched) for arg in law.args] if not isinstance(law, Piecewise) else []
+    if isinstance(law, Relational):
+        return law
     if not isinstance(law, Piecewise):
-        return law if isinstance(law, Relational) else law.func(*args)
+        return law.func(*(_without_jumps(arg, switched) for arg in law.args))
     total: Any = sympy.S.Zero
     for value, condition in reversed(law.args):
         weight = _weight(condition, switched)

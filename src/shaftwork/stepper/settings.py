@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from shaftwork.components.base import Component
 from shaftwork.core.errors import ParameterError
 from shaftwork.network.netlist import Netlist, first_few
-from shaftwork.pipeline.arguments import Names, as_names, checked_parameters
+from shaftwork.pipeline.arguments import STAND_IN, Names, as_names, checked_parameters
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.model import Model
-
-STANDING = 1.0
-"""What stands for an input where its model is made: its equations hold for all values, zero among them."""
 
 
 class Settings:
@@ -34,8 +31,7 @@ class Settings:
 
     def __init__(self, model: Model, parameters: Mapping[str, float] | None, inputs: Names) -> None:
         self._base, self.values = model, dict[str, float]()
-        self._numbers = _names(model.netlist, laws=False)
-        self._laws = {name: None for name in _names(model.netlist, laws=True) if _is_law(model.netlist, name)}
+        self._numbers, self._laws = (_names(model.netlist, kind) for kind in (_is_number, _is_law))
         self.inputs = () if inputs is None else as_names(inputs)
         for name in self.inputs:
             if name not in self._laws and name not in self._numbers:
@@ -78,36 +74,30 @@ class Settings:
     def _model_of(self, values: dict[str, float], replaced: tuple[str, ...]) -> tuple[Model, dict[str, float]]:
         """The model in which values hold, and those that it takes as parameters."""
         model = self._standing(replaced)
-        if not model.changes_structure({**values, **{name: values[name] or STANDING for name in replaced}}):
+        if not model.changes_structure({**values, **{name: values[name] or STAND_IN for name in replaced}}):
             return model, values
         others = {name: value for name, value in values.items() if name not in replaced}
         return model.variant(others), {name: values[name] for name in replaced}
 
     def _standing(self, replaced: tuple[str, ...]) -> Model:
-        return self._base.variant(dict.fromkeys(replaced, STANDING)) if replaced else self._base
+        return self._base.variant(dict.fromkeys(replaced, STAND_IN)) if replaced else self._base
 
     def _refuse(self, name: Any) -> None:
-        names, title = _names(self._base.netlist, laws=True), self._base.name
+        names, title = {**self._laws, **self._numbers}, self._base.name
         of_part = [other for other in names if other.rpartition(".")[0] == str(name).rpartition(".")[0]]
         there = f"There are: {first_few(of_part or [*names], 12)}." if names else "It has none."
         raise ParameterError(f"'{title}' has no input or parameter {name!r}. {there}")
 
 
-def _names(netlist: Netlist, *, laws: bool) -> dict[str, None]:
-    """The values that were given as numbers, and the laws where these count too, as "part.parameter"."""
+def _names(netlist: Netlist, suits: Callable[[Component, str], bool]) -> dict[str, None]:
+    """The parameters of a kind, as "part.parameter"."""
     pairs = ((placed.part, key) for placed in netlist.placed for key in placed.part.declared)
-    return {f"{part.name}.{key}": None for part, key in pairs if _is_number(part, key) or (laws and _law(part, key))}
+    return {f"{part.name}.{key}": None for part, key in pairs if suits(part, key)}
 
 
 def _is_number(part: Component, key: str) -> bool:
     return isinstance(part.declared[key].magnitude(part.values[key])[0], float)
 
 
-def _law(part: Component, key: str) -> bool:
+def _is_law(part: Component, key: str) -> bool:
     return part.declared[key].law and part.values[key] is not None
-
-
-def _is_law(netlist: Netlist, name: str) -> bool:
-    owner, _, key = str(name).rpartition(".")
-    parts = (placed.part for placed in netlist.placed if placed.part.name == owner)
-    return any(key in part.declared and _law(part, key) for part in parts)

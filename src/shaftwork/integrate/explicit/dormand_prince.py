@@ -129,14 +129,14 @@ class _MachineStepper:
         if not count:
             raise self._failure(t, x)
         starts, begun = np.append(t, ends[: count - 1]), np.vstack([x, states[: count - 1]])
-        made = [_Taken(piece, *step) for step in zip(starts.tolist(), lengths.tolist(), begun, strict=False)]
-        batch = _MachineDense(self._machine, np.append(t, ends[:count]), made)
+        steps = [_Taken(piece, *step) for step in zip(starts.tolist(), lengths.tolist(), begun, strict=False)]
+        batch = _MachineDense(self._machine, np.append(t, ends[:count]), steps)
         first = self._clear(batch, ends[:count], states[:count], middles) if self._watches else count
         number = min(first, count - 1)
         self._ahead = min(2 * self._ahead, MOST_AHEAD) if first == count else FIRST_AHEAD
         self._step = following if number == count - 1 else lengths[number + 1]
-        self._taken += made[:number]
-        self._last = made[number]
+        self._taken += steps[:number]
+        self._last = steps[number]
         before = (ends[:number], states[:number]) if number else None
         return Step(ends[number], states[number], batch, before, clear=first == count)
 
@@ -146,17 +146,17 @@ class _MachineStepper:
     def take(self, t: float, end: float, state: Array) -> None:  # noqa: ARG002 (it can be made again)
         self._taken.append(self._last)
 
-    def _clear(self, made: _MachineDense, ends: Array, states: Array, middles: Array) -> int:
+    def _clear(self, batch: _MachineDense, ends: Array, states: Array, middles: Array) -> int:
         """How many of the first steps are so far from all guards and switches that they need no closer look.
 
         Args:
-            made: the steps.
+            batch: the steps.
             ends: (k,) of the steps, s.
             states: (k, n) there.
             middles: (k, n) inside them, at `FIRST`.
         """
-        starts, count = made.steps[:-1], ends.size
-        points = np.vstack([made.states[:1], middles[:count], states])
+        starts, count = batch.steps[:-1], ends.size
+        points = np.vstack([batch.states[:1], middles[:count], states])
         values = self._watched(np.concatenate([starts[:1], starts + FIRST * (ends - starts), ends]), points)
         middle, after = values[1 : count + 1], values[count + 1 :]
         before = np.vstack([values[:1], after[:-1]])
@@ -165,7 +165,7 @@ class _MachineStepper:
         near = np.flatnonzero(~far)
         if near.size:
             times = (starts[near, None] + LOOKS * (ends - starts)[near, None]).ravel()
-            inside = self._watched(times, made(times)).reshape(near.size, LOOKS.size, -1)
+            inside = self._watched(times, batch(times)).reshape(near.size, LOOKS.size, -1)
             course = np.concatenate([before[near, None], inside, after[near, None]], axis=1)
             moves = np.abs(np.diff(course, axis=1)).max(axis=1)
             far[near] = ((np.abs(course).min(axis=1) > moves) | (moves == 0)).all(axis=1)

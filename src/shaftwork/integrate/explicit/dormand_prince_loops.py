@@ -166,16 +166,16 @@ def between(rates, p, spans, starts, lengths, states, numbers, times, values):  
         times: (k,) s.
         values: (k, n) takes the states.
     """
-    n, known = states.shape[1], -1
+    n, prepared = states.shape[1], -1
     slopes, shapes = np.empty((STAGES + 1 + FURTHER, n)), np.empty((SHAPES, n))
     y, end = np.empty(n), np.empty(n)
     for k in range(times.size):
         number = numbers[k]
         t, length, x, span = starts[number], lengths[number], states[number], spans[number]
-        if number != known:
+        if number != prepared:
             rates(min(max(t, span[0]), span[1]), x, p, slopes[0])
             _all_stages(rates, p, span, t, x, length, slopes, y, end)
             rates(min(max(t + length, span[0]), span[1]), end, p, slopes[STAGES])
             _shapes(rates, p, span, t, x, length, slopes, y, end, shapes)
-            known = number
+            prepared = number
         _inside(shapes, x, (times[k] - t) / length, values[k])

@@ -18,6 +18,8 @@ from shaftwork.numerics.tolerances import SAME
 
 # What heyoka's outcomes are called here where a guard ended the run.
 GUARD = "guard"
+# Part of a state by which a series and the equations may differ.
+DEFECT = 1e-8
 # What is the least that rounding moves a guard of size 1.
 ROUNDING = 8 * float(np.finfo(float).eps)
 
@@ -281,4 +283,4 @@ def satisfied(
     with np.errstate(all="ignore"):
         defect = np.abs(np.multiply(elapsed, rhs(piece.inside(start + elapsed), state)) - change)
     moved = np.maximum(np.abs(state), sizes) + np.abs(change)
-    return bool((defect <= 1e-8 * moved + problem.atol).all())
+    return bool((defect <= DEFECT * moved + problem.atol).all())

@@ -12,7 +12,7 @@ import numpy as np
 
 from shaftwork.integrate.problem import Array, Problem
 from shaftwork.integrate.smooth_intervals import pieces
-from shaftwork.integrate.taylor.heyoka_run import TaylorRun
+from shaftwork.integrate.taylor.heyoka_run import DEFECT, TaylorRun
 from shaftwork.integrate.taylor.heyoka_switches import INSIDE, SOMEWHERE, WRONG_SIDE
 from shaftwork.integrate.taylor.heyoka_taylor import tolerance
 
@@ -20,8 +20,6 @@ MOST = 100
 """Series in one step from outside: where more are needed the motion is stiff, and another engine may be quicker."""
 LOOKS = np.array([0.9, *INSIDE])
 """Where in a series it is compared with the equations, and then where conditions are, as parts of its length."""
-DEFECT = 1e-8
-"""Part of a state by which they may differ there, as in `TaylorRun`."""
 
 
 class Snapshot(NamedTuple):

@@ -356,7 +356,7 @@ class _Parser(TokenCursor):
         return SyntaxTerm("name", name, (), token.line)
 
     def _array(self, closing: str, line: int) -> SyntaxTerm:
-        """ModelicaValues up to a bracket; rows between semicolons are arrays in an array."""
+        """Values up to a bracket; rows between semicolons are arrays in an array."""
         rows: list[list[SyntaxTerm]] = [[]]
         while not self._accept(closing):
             named = self._next.kind == "name" and self._tokens[self._place + 1].text == "="

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 class JoinedTerminals:
-    """JoinedTerminals that are joined."""
+    """Terminals, and which of them are one node; the first of two stands for both."""
 
     def __init__(self) -> None:
         self._parents: dict[str, str] = {}

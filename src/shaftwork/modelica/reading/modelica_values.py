@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -29,7 +30,16 @@ _FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "noEvent": lambda x: x,
     "smooth": lambda _, x: x,
 }
-_RELATIONS: Mapping[str, Callable[..., Any]] = {
+_OPERATORS: Mapping[str, Callable[..., Any]] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": operator.truediv,
+    "^": operator.pow,
+    "negative": operator.neg,
+    "not": sympy.Not,
+    "and": sympy.And,
+    "or": sympy.Or,
     "<": sympy.Lt,
     "<=": sympy.Le,
     ">": sympy.Gt,
@@ -95,28 +105,8 @@ class ModelicaValues:
             return values
         if term.kind == "call":
             return self._call(term, values)
-        if term.kind in _RELATIONS:
-            return _RELATIONS[term.kind](*values)
-        return self._operation(term, values)
-
-    def _operation(self, term: SyntaxTerm, values: list[Any]) -> Any:
-        match term.kind, values:
-            case "negative", [one]:
-                return -one
-            case "not", [one]:
-                return sympy.Not(one)
-            case (("and" | "or"), [one, other]):
-                return (sympy.And if term.kind == "and" else sympy.Or)(one, other)
-            case "+", [one, other]:
-                return one + other
-            case "-", [one, other]:
-                return one - other
-            case "*", [one, other]:
-                return one * other
-            case "/", [one, other]:
-                return one / other
-            case "^", [one, other]:
-                return one**other
+        if term.kind in _OPERATORS:
+            return _OPERATORS[term.kind](*values)
         raise fault(term.line, "the expression is not one of numbers, parameters and time.")
 
     def _choice(self, term: SyntaxTerm) -> Any:
