@@ -234,6 +234,7 @@ class ModeTables:
         yield _integers("ONE_WAY", [machine.is_one_way for machine in machines])
         yield _integers("IS_SWITCH", [machine.is_switch for machine in machines])
         yield _integers("IS_TORQUE", torques)
+        yield _integers("AT_REST", [k in one.resting for one in self._guards for k in range(len(machines))])
         yield from self._of_leaves()
         yield from self._of_states()
 
