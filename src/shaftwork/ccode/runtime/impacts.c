@@ -114,6 +114,14 @@ static int in_turn(const NAME *m, Contact *c, int n)
     return left;
 }
 
+/* The same, but zero where inertias and prescribed speeds do not tell the speed, as no impulse passes there. */
+static void passing_at(const NAME *m, const Contact *c, int n, double *opens)
+{
+    opens_at(m, c, n, opens);
+    for (int k = 0; k < n; k++)
+        if (!HAS_INERTIA[m->set * NM + c[k].machine]) opens[k] = 0.0;
+}
+
 /* The changes of the speeds of inertias by unit impulses at contacts, and those of the speeds across contacts. */
 static void mobility(const NAME *m, const Contact *c, int n, double *answers, double *W)
 {
@@ -236,7 +244,7 @@ static int collided(NAME *m, const Contact *c, int n, const double *back, double
     if (!loosen(m, c, n)) return 0;
     memcpy(mode, m->mode, sizeof mode);
     mobility(m, c, n, answers, W);
-    opens_at(m, c, n, opens);
+    passing_at(m, c, n, opens);
     for (int k = 0; k < n; k++) pressed[k] = 0.0;
     if (complementary(W, opens, n, pressed)) push(m, answers, n, pressed);
     else {
@@ -248,7 +256,7 @@ static int collided(NAME *m, const Contact *c, int n, const double *back, double
     if (!any) return 1;
     double shares_back[MOST_CONTACTS], impulses[MOST_CONTACTS], rest[MOST_CONTACTS], energy = 0.0;
     mobility(m, c, n, answers, W);
-    opens_at(m, c, n, opens);
+    passing_at(m, c, n, opens);
     for (int k = 0; k < n; k++) shares_back[k] = back[k] * pressed[k];
     for (int i = 0; i < n; i++)
         for (int k = 0; k < n; k++) energy += 0.5 * shares_back[i] * W[i * n + k] * shares_back[k];
@@ -264,24 +272,47 @@ static int collided(NAME *m, const Contact *c, int n, const double *back, double
     return 1;
 }
 
-/* The modes after an impact: what is hit and does not open stays closed, and what rubs slips where it moves. */
+/* The modes after an impact: what is hit and does not open stays closed, and what rubs slips where it moves. No impulse
+ * tells whether contacts beside massless nodes press: where they would take one, each is joined as its ends still come
+ * together. */
 static int closed_at_end(NAME *m, const int *before, const Contact *c, int n, double least, const int *hit, int *stays)
 {
     double opens[MOST_CONTACTS], speeds[NM];
-    int mode[NM];
-    opens_at(m, c, n, opens);
+    int closed[NM], mode[NM], open_yet[MOST_CONTACTS], left = 0;
+    passing_at(m, c, n, opens);
     across(m, inside(m, m->t), m->x, speeds);
     for (int k = 0; k < NM; k++) {
-        mode[k] = m->mode[k];
+        closed[k] = m->mode[k];
         if (!rubs(k, before[k])) continue;
         const int way = fabs(speeds[k]) > least ? way_of(k, before[k], speeds[k]) : -1;
-        mode[k] = way >= 0 ? way : before[k];
+        closed[k] = way >= 0 ? way : before[k];
     }
+    memcpy(mode, closed, sizeof mode);
     for (int k = 0; k < n; k++) {
         stays[k] = opens[k] <= least && (c[k].leave < 0 || hit[k]);
-        if (stays[k]) mode[c[k].machine] = c[k].joined;
+        open_yet[k] = stays[k] && c[k].leave < 0 && !HAS_INERTIA[m->set * NM + c[k].machine];
+        left += open_yet[k];
+        if (stays[k]) closed[c[k].machine] = c[k].joined;
+        if (stays[k] && !open_yet[k]) mode[c[k].machine] = c[k].joined;
     }
-    return to_modes(m, mode);
+    NAME apart = *m;
+    if (!to_modes(m, closed)) return 0;
+    if (!left) return 1;
+    if (!to_modes(&apart, mode)) return 0;
+    if (!differs(m, &apart, least)) return 1;
+    while (left > 0) {
+        int first = -1;
+        opens_at(&apart, c, n, opens);
+        for (int k = 0; k < n; k++)
+            if (open_yet[k] && (first < 0 || opens[k] < opens[first])) first = k;
+        if (opens[first] >= -least) break;
+        if (!with_mode(&apart, c[first].machine, c[first].joined)) return 0;
+        open_yet[first] = 0;
+        left--;
+    }
+    for (int k = 0; k < n; k++) stays[k] = stays[k] && !open_yet[k];
+    *m = apart;
+    return 1;
 }
 
 /* What follows where sources jump or something jams: what is closed takes it up or opens. */
