@@ -8,6 +8,7 @@ from sympy import Abs, Expr, Min, Mul, Pow, Symbol, asin, cos, floor, pi, simpli
 
 from shaftwork.ccode.printing import Statements, array, function
 from shaftwork.components.discontinuities import line, narrow_places, switches, unsolved_places
+from shaftwork.components.law_slopes import MOST_DEGREE
 from shaftwork.components.laws import replaced
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError
@@ -64,7 +65,7 @@ class Instants:
     def _pulses(self, law: Expr) -> Iterator[Expr]:
         """Functions that may have pulses at times that `narrow_places` does not tell; a root of one has them there."""
         for place in unsolved_places(law, self._still):
-            if isinstance(place, Pow) and place.exp.is_number and place.exp > 0:
+            if isinstance(place, Pow) and place.exp.is_number and 0 < place.exp <= MOST_DEGREE:
                 yield from self._pulses(place.base)
             else:
                 yield place

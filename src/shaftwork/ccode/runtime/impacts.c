@@ -235,6 +235,34 @@ static int loosen(NAME *m, const Contact *c, int n)
     return to_modes(m, mode);
 }
 
+static int goes_on(const NAME *m, const Contact *c, int n)
+{
+    NAME other = *m;
+    return loosen(&other, c, n) && keeps(m, &other, 1);
+}
+
+/* The contacts that an impact may open: not diodes and freewheels that alone let a current or torque go on. */
+static int may_open(const NAME *m, Contact *c, int n)
+{
+    Contact opened[MOST_CONTACTS];
+    int opens[MOST_CONTACTS], count = 0, left = 0;
+    if (!HAS_TORQUES) return n;
+    for (int k = 0; k < n; k++) {
+        opens[k] = c[k].leave >= 0 || !ONE_WAY[c[k].machine];
+        if (opens[k]) opened[count++] = c[k];
+    }
+    if (count == n || goes_on(m, c, n)) return n;
+    for (int k = 0; k < n; k++) {
+        if (opens[k]) continue;
+        opened[count] = c[k];
+        opens[k] = goes_on(m, opened, count + 1);
+        count += opens[k];
+    }
+    for (int k = 0; k < n; k++)
+        if (opens[k]) c[left++] = c[k];
+    return left;
+}
+
 /* From modes in which all contacts are open, and what rubs slips: contacts stop what closes; shares of the impulses
  * come back. 0 where modes contradict each other. The impulses of both parts are added up, by contact. */
 static int collided(NAME *m, const Contact *c, int n, const double *back, double *pressed)
@@ -321,7 +349,7 @@ static int pulled(NAME *m, double least, int sources_jump)
     Contact c[MOST_CONTACTS] = {{0, 0, 0, 0, 0.0, 0.0, 0.0}};
     double back[MOST_CONTACTS] = {0.0}, pressed[MOST_CONTACTS];
     int hit[MOST_CONTACTS], stays[MOST_CONTACTS], before[NM];
-    const int n = lasting(m, c);
+    const int n = may_open(m, c, lasting(m, c));
     memcpy(before, m->mode, sizeof before);
     if (sources_jump) {
         if (!loosen(m, c, n)) return 0;
@@ -338,7 +366,7 @@ static int impact(NAME *m, int leave, int may_rebound, int *thrown)
     Contact c[MOST_CONTACTS] = {{0, 0, 0, 0, 0.0, 0.0, 0.0}};
     double opens[MOST_CONTACTS], back[MOST_CONTACTS], pressed[MOST_CONTACTS], fastest = 0.0, largest = 0.0;
     int hit[MOST_CONTACTS], stays[MOST_CONTACTS], before[NM], wanted = -1;
-    int n = touching(m, leave, c);
+    int n = may_open(m, c, touching(m, leave, c));
     memcpy(before, m->mode, sizeof before);
     opens_at(m, c, n, opens);
     for (int k = 0; k < n; k++) fastest = fmax(fastest, -opens[k]);
