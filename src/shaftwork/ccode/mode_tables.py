@@ -168,18 +168,23 @@ class ModeTables:
 
     def _gains(self, one: SetFunctions, speeds: Sequence[Expr]) -> Iterator[tuple[str, Expr]]:
         """What the speed across each machine has of that of each inertia; nothing where torques tell it as well."""
-        form = one.form
-        massless = {branch for kind in WITHOUT_INERTIA for branch in form.tree.tree[kind]}  # only asked for membership
-        symbols = one.rows.states[form.speeds]
-        for k, (machine, speed) in enumerate(zip(self._machines, speeds, strict=True)):
-            part = next(part for part in form.graph.parts if part.name == machine.part.name)
-            ends = [part.node_at(end) for end in part.ends_of(machine.modes)]
-            trees = {tree for node in ends if node != GROUND for tree in form.tree.potentials[node] or {}}
-            if not trees.isdisjoint(massless):
-                continue
-            for j, symbol in enumerate(symbols):
+        symbols = one.rows.states[one.form.speeds]
+        for k, (told, speed) in enumerate(zip(self._has_inertia(one), speeds, strict=True)):
+            for j, symbol in enumerate(symbols if told else ()):
                 if (gain := speed.diff(symbol)) != 0:
                     yield f"gains[{k} * NX + {j}]", gain
+
+    def _has_inertia(self, one: EquationSet | SetFunctions) -> list[bool]:
+        """Of each machine whether the speeds of inertias and prescribed ones tell the speed across it."""
+        form, told = one.form, list[bool]()
+        massless = {branch for kind in WITHOUT_INERTIA for branch in form.tree.tree[kind]}  # only asked for membership
+        for machine in self._machines:
+            part = next(part for part in form.graph.parts if part.name == machine.part.name)
+            nodes = [part.node_at(end) for end in part.ends_of(machine.modes)]
+            rows = [{} if node == GROUND else form.tree.potentials[node] or {} for node in nodes]
+            trees = {tree for row in rows for tree in row if tree in massless}
+            told.append(all(rows[0].get(tree, 0) == rows[1].get(tree, 0) for tree in trees))
+        return told
 
     def _leave_numbers(self, one: SetFunctions, statements: Statements) -> str:
         """Restitution, speed of rest and twist at the limit of each leave that rebounds."""
@@ -235,6 +240,7 @@ class ModeTables:
         yield _integers("ONE_WAY", [machine.is_one_way for machine in machines])
         yield _integers("IS_SWITCH", [machine.is_switch for machine in machines])
         yield _integers("IS_TORQUE", torques)
+        yield _integers("AT_REST", [k in one.resting for one in self._guards for k in range(len(machines))])
         yield from self._of_leaves()
         yield from self._of_states()
 
@@ -278,6 +284,7 @@ class ModeTables:
         for name, column in (("MOVE_PART", 0), ("MOVE_LEAST", 1), ("MOVE_REACH", 3)):
             yield array("const double", name, [repr(float(move[column])) for move in moves])
         yield _integers("STORE_OF", [stores.index(name) if name in stores else -1 for name in states])
+        yield _integers("HAS_INERTIA", [told for one in self.sets for told in self._has_inertia(one)])
         yield _integers("SPEEDS", [len(one.form.across_states) for one in self.sets])
         places, size = list[int](), max(len(states), 1)
         twists = list[int]()

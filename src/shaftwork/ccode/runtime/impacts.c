@@ -114,6 +114,14 @@ static int in_turn(const NAME *m, Contact *c, int n)
     return left;
 }
 
+/* The same, but zero where inertias and prescribed speeds do not tell the speed, as no impulse passes there. */
+static void passing_at(const NAME *m, const Contact *c, int n, double *opens)
+{
+    opens_at(m, c, n, opens);
+    for (int k = 0; k < n; k++)
+        if (!HAS_INERTIA[m->set * NM + c[k].machine]) opens[k] = 0.0;
+}
+
 /* The changes of the speeds of inertias by unit impulses at contacts, and those of the speeds across contacts. */
 static void mobility(const NAME *m, const Contact *c, int n, double *answers, double *W)
 {
@@ -227,6 +235,34 @@ static int loosen(NAME *m, const Contact *c, int n)
     return to_modes(m, mode);
 }
 
+static int goes_on(const NAME *m, const Contact *c, int n)
+{
+    NAME other = *m;
+    return loosen(&other, c, n) && keeps(m, &other, 1);
+}
+
+/* The contacts that an impact may open: not diodes and freewheels that alone let a current or torque go on. */
+static int may_open(const NAME *m, Contact *c, int n)
+{
+    Contact opened[MOST_CONTACTS];
+    int opens[MOST_CONTACTS], count = 0, left = 0;
+    if (!HAS_TORQUES) return n;
+    for (int k = 0; k < n; k++) {
+        opens[k] = c[k].leave >= 0 || !ONE_WAY[c[k].machine];
+        if (opens[k]) opened[count++] = c[k];
+    }
+    if (count == n || goes_on(m, c, n)) return n;
+    for (int k = 0; k < n; k++) {
+        if (opens[k]) continue;
+        opened[count] = c[k];
+        opens[k] = goes_on(m, opened, count + 1);
+        count += opens[k];
+    }
+    for (int k = 0; k < n; k++)
+        if (opens[k]) c[left++] = c[k];
+    return left;
+}
+
 /* From modes in which all contacts are open, and what rubs slips: contacts stop what closes; shares of the impulses
  * come back. 0 where modes contradict each other. The impulses of both parts are added up, by contact. */
 static int collided(NAME *m, const Contact *c, int n, const double *back, double *pressed)
@@ -236,7 +272,7 @@ static int collided(NAME *m, const Contact *c, int n, const double *back, double
     if (!loosen(m, c, n)) return 0;
     memcpy(mode, m->mode, sizeof mode);
     mobility(m, c, n, answers, W);
-    opens_at(m, c, n, opens);
+    passing_at(m, c, n, opens);
     for (int k = 0; k < n; k++) pressed[k] = 0.0;
     if (complementary(W, opens, n, pressed)) push(m, answers, n, pressed);
     else {
@@ -248,7 +284,7 @@ static int collided(NAME *m, const Contact *c, int n, const double *back, double
     if (!any) return 1;
     double shares_back[MOST_CONTACTS], impulses[MOST_CONTACTS], rest[MOST_CONTACTS], energy = 0.0;
     mobility(m, c, n, answers, W);
-    opens_at(m, c, n, opens);
+    passing_at(m, c, n, opens);
     for (int k = 0; k < n; k++) shares_back[k] = back[k] * pressed[k];
     for (int i = 0; i < n; i++)
         for (int k = 0; k < n; k++) energy += 0.5 * shares_back[i] * W[i * n + k] * shares_back[k];
@@ -264,24 +300,47 @@ static int collided(NAME *m, const Contact *c, int n, const double *back, double
     return 1;
 }
 
-/* The modes after an impact: what is hit and does not open stays closed, and what rubs slips where it moves. */
+/* The modes after an impact: what is hit and does not open stays closed, and what rubs slips where it moves. No impulse
+ * tells whether contacts beside massless nodes press: where they would take one, each is joined as its ends still come
+ * together. */
 static int closed_at_end(NAME *m, const int *before, const Contact *c, int n, double least, const int *hit, int *stays)
 {
     double opens[MOST_CONTACTS], speeds[NM];
-    int mode[NM];
-    opens_at(m, c, n, opens);
+    int closed[NM], mode[NM], open_yet[MOST_CONTACTS], left = 0;
+    passing_at(m, c, n, opens);
     across(m, inside(m, m->t), m->x, speeds);
     for (int k = 0; k < NM; k++) {
-        mode[k] = m->mode[k];
+        closed[k] = m->mode[k];
         if (!rubs(k, before[k])) continue;
         const int way = fabs(speeds[k]) > least ? way_of(k, before[k], speeds[k]) : -1;
-        mode[k] = way >= 0 ? way : before[k];
+        closed[k] = way >= 0 ? way : before[k];
     }
+    memcpy(mode, closed, sizeof mode);
     for (int k = 0; k < n; k++) {
         stays[k] = opens[k] <= least && (c[k].leave < 0 || hit[k]);
-        if (stays[k]) mode[c[k].machine] = c[k].joined;
+        open_yet[k] = stays[k] && c[k].leave < 0 && !HAS_INERTIA[m->set * NM + c[k].machine];
+        left += open_yet[k];
+        if (stays[k]) closed[c[k].machine] = c[k].joined;
+        if (stays[k] && !open_yet[k]) mode[c[k].machine] = c[k].joined;
     }
-    return to_modes(m, mode);
+    NAME apart = *m;
+    if (!to_modes(m, closed)) return 0;
+    if (!left) return 1;
+    if (!to_modes(&apart, mode)) return 0;
+    if (!differs(m, &apart, least)) return 1;
+    while (left > 0) {
+        int first = -1;
+        opens_at(&apart, c, n, opens);
+        for (int k = 0; k < n; k++)
+            if (open_yet[k] && (first < 0 || opens[k] < opens[first])) first = k;
+        if (opens[first] >= -least) break;
+        if (!with_mode(&apart, c[first].machine, c[first].joined)) return 0;
+        open_yet[first] = 0;
+        left--;
+    }
+    for (int k = 0; k < n; k++) stays[k] = stays[k] && !open_yet[k];
+    *m = apart;
+    return 1;
 }
 
 /* What follows where sources jump or something jams: what is closed takes it up or opens. */
@@ -290,7 +349,7 @@ static int pulled(NAME *m, double least, int sources_jump)
     Contact c[MOST_CONTACTS] = {{0, 0, 0, 0, 0.0, 0.0, 0.0}};
     double back[MOST_CONTACTS] = {0.0}, pressed[MOST_CONTACTS];
     int hit[MOST_CONTACTS], stays[MOST_CONTACTS], before[NM];
-    const int n = lasting(m, c);
+    const int n = may_open(m, c, lasting(m, c));
     memcpy(before, m->mode, sizeof before);
     if (sources_jump) {
         if (!loosen(m, c, n)) return 0;
@@ -307,7 +366,7 @@ static int impact(NAME *m, int leave, int may_rebound, int *thrown)
     Contact c[MOST_CONTACTS] = {{0, 0, 0, 0, 0.0, 0.0, 0.0}};
     double opens[MOST_CONTACTS], back[MOST_CONTACTS], pressed[MOST_CONTACTS], fastest = 0.0, largest = 0.0;
     int hit[MOST_CONTACTS], stays[MOST_CONTACTS], before[NM], wanted = -1;
-    int n = touching(m, leave, c);
+    int n = may_open(m, c, touching(m, leave, c));
     memcpy(before, m->mode, sizeof before);
     opens_at(m, c, n, opens);
     for (int k = 0; k < n; k++) fastest = fmax(fastest, -opens[k]);

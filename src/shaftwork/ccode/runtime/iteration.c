@@ -161,6 +161,63 @@ static int iterate(NAME *m)
     return best - 1;
 }
 
+/* Machines that slip, with no speed across them as others hold their ends, pass to the modes in which they hold. */
+static int hold_at_rest(NAME *m)
+{
+    int list[MOST_WATCHED] = {0}, slips[NM], mode[NM], any = 0;
+    double dx[NX], x[NX], g[NG], near[NG];
+    const int count = watched(m, list);
+    for (int k = 0; k < NM; k++) slips[k] = -1;
+    for (int n = 0; n < count; n++) {
+        const Leave leave = LEAVES[WATCHES[list[n]].leave];
+        for (int i = 0; i < N_LEAVES && leave.to >= 0; i++)
+            if (LEAVES[i].machine == leave.machine && LEAVES[i].from == leave.to && LEAVES[i].to == leave.from &&
+                (LEAVES[i].how & BY_TORQUE))
+                slips[leave.machine] = list[n];
+    }
+    course(m, m->t, m->x, dx, g);
+    beside(m, m->x, dx, 1.0, x);
+    guards(m, inside(m, m->t + tick_of(m->t)), x, near);
+    memcpy(mode, m->mode, sizeof mode);
+    for (int k = 0; k < NM; k++) {
+        if (slips[k] < 0) continue;
+        const Watch w = WATCHES[slips[k]];
+        const int still = AT_REST[m->set * NM + k] && (LEAVES[w.leave].how & BY_SPEED);
+        if (!still && (g[w.guard] != 0.0 || near[w.guard] != 0.0)) continue;
+        mode[k] = LEAVES[w.leave].to;
+        if (set_of(mode) < 0) mode[k] = m->mode[k]; /* beside a prescribed speed not all of them can */
+        else any = 1;
+    }
+    return any && to_modes(m, mode);
+}
+
+/* What `iterate` does, but where machines rest who carries is told anew: a law that falls at once would tell a way in
+ * which nothing moves. */
+static int iterate_at_rest(NAME *m)
+{
+    const NAME begun = *m;
+    double g[NG];
+    int list[MOST_WATCHED] = {0}, crossed = -1, ends = m->met >= 0;
+    const int count = watched(m, list);
+    guards(m, inside(m, m->t), m->x, g);
+    for (int n = 0; n < count; n++) {
+        const Watch w = WATCHES[list[n]];
+        if (w.guard == m->met) crossed = w.leave;
+        ends |= w.side * g[w.guard] > 0.0;
+    }
+    if (!ends || !hold_at_rest(m)) return iterate(m);
+    for (int i = 0; i < NG; i++) m->clear[i] = 0.0;
+    m->met = -1;
+    NAME stuck = *m;
+    const int transitions = consistent(m, -1);
+    if (transitions < 0 || !same_modes(m->mode, begun.mode)) return transitions;
+    const int held = watched(&stuck, list); /* rounding hides what was met */
+    for (int n = 0; n < held; n++)
+        if (WATCHES[list[n]].leave == crossed) stuck.met = WATCHES[list[n]].guard;
+    *m = stuck;
+    return iterate(m);
+}
+
 int NAME_event(NAME *m)
 {
     int mode[NM], what = 0;
@@ -176,7 +233,7 @@ int NAME_event(NAME *m)
         if (!(changed && holds && pulled(m, NO_IMPACT, 1))) *m = jumps;
         if (changed) m->met = -1;
     }
-    const int transitions = iterate(m);
+    const int transitions = iterate_at_rest(m);
     if (transitions < 0) return transitions;
     if (!same_modes(mode, m->mode)) what |= NAME_MODES_CHANGED;
     for (int i = 0; i < NX; i++)
