@@ -19,7 +19,7 @@ import numpy as np
 
 import shaftwork as sw
 from benchmarks import crane_rivals as rivals
-from shaftwork.ccode.export import c_code
+from shaftwork.ccode.c_export import c_code
 from shaftwork.scenes import SCENES
 
 FLAGS = ["-std=c99", "-O3", "-march=native", "-shared", "-fPIC"]

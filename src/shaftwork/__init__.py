@@ -103,7 +103,7 @@ if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
     from shaftwork.core.parameters import parameter as parameter
     from shaftwork.equations.notations import Inverse as Inverse, Notation as Notation
     from shaftwork.motionfiles.loading import load_solution as load_solution
-    from shaftwork.opentorsion.reader import from_opentorsion as from_opentorsion
+    from shaftwork.opentorsion.opentorsion_reader import from_opentorsion as from_opentorsion
     from shaftwork.modelica.reading.modelica_reader import (
         ModelicaModel as ModelicaModel,
         read_modelica as read_modelica,
@@ -168,7 +168,7 @@ _HOME = {
     "shaftwork.core.parameters": ("parameter",),
     "shaftwork.equations.notations": ("Inverse", "Notation"),
     "shaftwork.motionfiles.loading": ("load_solution",),
-    "shaftwork.opentorsion.reader": ("from_opentorsion",),
+    "shaftwork.opentorsion.opentorsion_reader": ("from_opentorsion",),
     "shaftwork.modelica.reading.modelica_reader": ("ModelicaModel", "read_modelica"),
     "shaftwork.fmu.fmu_parts": ("FMUSpeed", "FMUTorque"),
     "shaftwork.fmu.foreign_unit": ("FMU",),

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shaftwork.ccode.export import CCode
+from shaftwork.ccode.c_export import CCode
 
 STRICT = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Wconversion", "-Werror"]
 """The code compiles silently."""

@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import shaftwork as sw
-from shaftwork.ccode.export import c_code, c_name
+from shaftwork.ccode.c_export import c_code, c_name
 from shaftwork.core.errors import CompileError
 from shaftwork.scenes import SCENES
 from tests.beds import bed_of

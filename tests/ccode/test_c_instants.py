@@ -11,7 +11,7 @@ import sympy
 from sympy import Abs, Max, Piecewise, cos, floor, pi, sin, sqrt
 
 import shaftwork as sw
-from shaftwork.ccode.export import c_code
+from shaftwork.ccode.c_export import c_code
 from shaftwork.core.errors import CompileError
 from tests.ccode.library import Library
 

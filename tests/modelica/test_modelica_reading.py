@@ -152,6 +152,7 @@ REFUSALS = [
     ("J2.flange_a", "J2.flange_c", 9, r"there is no connector 'J2.flange_c'"),
     ("J2.flange_a", "J4.flange_a", 9, r"there is no connector 'J4.flange_a'"),
     ("end Train;", "end Tram;", 11, r"'end Train' is expected, and there is 'end Tram'"),
+    ("(StopTime", "(StartTime = 1, StopTime", 10, r"another StartTime than 0 is not read"),
     ("end Train;", "", 1, r"'Train' has no end"),
     ("model Train", "model Train\n  extends Other;", 2, r"it extends 'Other'"),
     ("equation", "initial equation\n  J1.w = 1;\nequation", 7, r"an initial section is not read"),

@@ -364,6 +364,13 @@ def test_a_file_is_named_in_errors_and_missing_ones_are_told(tmp_path: Path) -> 
         sw.spice.read(tmp_path / "wrong.cir")
 
 
+@pytest.mark.parametrize("text", ["rectifier.cir", "", "title\n.tran 1m 1\n.end\n"])
+def test_a_text_without_elements_is_refused(text: str) -> None:
+    """A path as a str would be the title of an empty circuit."""
+    with pytest.raises(sw.ModelFileError, match=r"no elements.*pathlib\.Path"):
+        sw.spice.read(text)
+
+
 def test_diodes_may_be_ideal() -> None:
     text = "title\nV1 1 0 SIN(0 1 50)\nD1 1 2 m\nR1 2 0 1k\nC1 2 0 1u\n.tran 1m 5m\n"
     with pytest.raises(sw.ModelFileError, match=r"there is no \.model 'm'"):

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from sympy import Abs, Expr, Min, Mul, Pow, Symbol, asin, cos, floor, pi, simplify, sin
 
-from shaftwork.ccode.printing import Statements, array, function
+from shaftwork.ccode.c_printing import Statements, array, function
 from shaftwork.components.discontinuities import line, narrow_places, switches, unsolved_places
 from shaftwork.components.law_slopes import MOST_DEGREE
 from shaftwork.components.laws import replaced

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 from sympy import Expr, Integer, Piecewise
 
+from shaftwork.ccode.c_printing import Statements, array, function, text_of
+from shaftwork.ccode.c_texts import dispatcher, runtime
 from shaftwork.ccode.equation_set import EquationSet
-from shaftwork.ccode.printing import Statements, array, function, text_of
 from shaftwork.ccode.set_functions import SetFunctions
-from shaftwork.ccode.texts import dispatcher, runtime
 from shaftwork.codegen.state_transfer import WITHOUT_INERTIA, StateTransfer
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH
 from shaftwork.components.laws import t as TIME

@@ -8,8 +8,8 @@ from functools import cached_property
 
 from sympy import Add, Expr, Integer, Symbol
 
+from shaftwork.ccode.c_printing import Statements, function
 from shaftwork.ccode.equation_set import EquationSet
-from shaftwork.ccode.printing import Statements, function
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.law_slopes import slope
 from shaftwork.formulation.form import store_name

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, NamedTuple, cast
 
 from sympy import Symbol
 
+from shaftwork.ccode.c_printing import Statements, array
+from shaftwork.ccode.c_texts import dispatcher, filled, names_of, runtime
 from shaftwork.ccode.equation_set import EquationSet
 from shaftwork.ccode.instants import Instants
-from shaftwork.ccode.printing import Statements, array
 from shaftwork.ccode.set_functions import ArrayLayout, SetFunctions, stored_symbol
-from shaftwork.ccode.texts import dispatcher, filled, names_of, runtime
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import SignalError

@@ -33,7 +33,7 @@ class Export(NamedTuple):
 
 
 def _c(net: Network, place: str, inputs: list[str], outputs: list[str] | None, t_end: float) -> Iterable[Path]:
-    from shaftwork.ccode.export import c_code
+    from shaftwork.ccode.c_export import c_code
 
     return c_code(net.compile(), inputs=inputs, outputs=outputs, t_end=t_end).write(place)
 

@@ -15,8 +15,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
+from shaftwork.ccode.c_export import CCode, c_code
 from shaftwork.ccode.equation_set import EquationSet
-from shaftwork.ccode.export import CCode, c_code
 from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.core.files import drafted, in_a_folder
 from shaftwork.core.parameters import in_si

@@ -14,7 +14,7 @@ from shaftwork.core.errors import ModelFileError, ParameterError, SignalError
 from shaftwork.modelfiles import textfile
 from shaftwork.modelfiles.own_parts import checked_trust
 from shaftwork.modelfiles.storage import netlist_of
-from shaftwork.motionfiles.files import read_motion
+from shaftwork.motionfiles.motion_files import read_motion
 from shaftwork.motionfiles.record import ARRIVING, FORMAT, PLAIN
 from shaftwork.pipeline.arguments import Demand
 from shaftwork.pipeline.compiler import Compiler

@@ -66,6 +66,6 @@ class ExportedModel(CompiledModel):
         Raises:
             CompileError, ParameterError, SignalError: there is no such code, name, input or output; says why.
         """
-        from shaftwork.ccode.export import c_code
+        from shaftwork.ccode.c_export import c_code
 
         return c_code(cast("Model", self), name=name, inputs=inputs, outputs=outputs).write(folder)

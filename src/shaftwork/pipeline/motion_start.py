@@ -224,7 +224,7 @@ class Repetition:
 
     def save(self, motion: Solution, path: str | Path, names: Sequence[str]) -> None:
         """Write the motion to a file, with this call; see `Solution.save`."""
-        from shaftwork.motionfiles.files import write_motion
+        from shaftwork.motionfiles.motion_files import write_motion
 
         write_motion(self, motion, path, names)
 

@@ -7,6 +7,6 @@ them, `waveforms` laws of sources, `lcapy_devices` what lcapy writes otherwise.
 
 from __future__ import annotations
 
-from shaftwork.spice.reader import SpiceCircuit, read
+from shaftwork.spice.netlist_reader import SpiceCircuit, read
 
 __all__ = ["SpiceCircuit", "read"]

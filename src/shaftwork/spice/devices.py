@@ -30,8 +30,8 @@ from shaftwork.components.electrical import (
 from shaftwork.components.laws import smaller, u
 from shaftwork.network.netlist import REFERENCE, Placed, first_few
 from shaftwork.spice.netlist_lines import ENDS, NetlistLine
+from shaftwork.spice.source_waveforms import source_law
 from shaftwork.spice.spice_numbers import NetlistValues
-from shaftwork.spice.waveforms import source_law
 
 THERMAL = 1.380649e-23 * 300.15 / 1.602176634e-19
 """Thermal voltage in V at 27 degrees Celsius, at which SPICE takes its diodes."""

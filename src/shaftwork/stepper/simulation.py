@@ -15,8 +15,8 @@ from shaftwork.integrate.engines import available
 from shaftwork.pipeline.arguments import Demand, Given, Names, relative_tolerance
 from shaftwork.pipeline.motion_start import ending_of, handed_over, time_of_start
 from shaftwork.results.solution import Solution
+from shaftwork.stepper.input_values import Settings
 from shaftwork.stepper.moments import SMOOTH, Moment, MomentState, Observations, plain_moment
-from shaftwork.stepper.settings import Settings
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.model import Model

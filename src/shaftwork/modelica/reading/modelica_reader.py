@@ -180,6 +180,8 @@ class _Reading:
                 parts.append(item)
                 taken.remove(item.nodes[0])
         network = Network._of(Netlist(self._text.name, tuple(parts)))  # noqa: SLF001 (as `Network.load` does)
+        if self._text.t_start is not None and self._values.of(self._text.t_start) != 0.0:
+            raise fault(self._text.t_start_line, "an experiment that begins at another StartTime than 0 is not read.")
         end = None if self._text.t_end is None else self._values.of(self._text.t_end)
         return ModelicaModel(network, self._initial(), end if isinstance(end, float) and end > 0 else None)
 

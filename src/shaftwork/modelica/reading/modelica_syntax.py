@@ -76,6 +76,8 @@ class ClassText:
     classes: list[ClassText] = field(default_factory=list)
     faults: list[tuple[int, str]] = field(default_factory=list)
     t_end: SyntaxTerm | None = None
+    t_start: SyntaxTerm | None = None
+    t_start_line: int = 0
 
 
 def parse(text: str) -> tuple[str, tuple[ClassText, ...]]:
@@ -151,9 +153,13 @@ class _Parser(TokenCursor):
         first = self._place
         self._skip_brackets()
         for place in range(first, self._place - 1):
-            if self._tokens[place].text == "StopTime" and self._tokens[place + 1].text == "=":
+            name, sign = self._tokens[place : place + 2]
+            if name.text in ("StartTime", "StopTime") and sign.text == "=":
                 behind, self._place = self._place, place + 2
-                result.t_end = self.expression()
+                if name.text == "StopTime":
+                    result.t_end = self.expression()
+                else:
+                    result.t_start, result.t_start_line = self.expression(), name.line
                 self._place = behind
 
     def _equation(self, result: ClassText) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from shaftwork.ccode.texts import runtime_names
+from shaftwork.ccode.c_texts import runtime_names
 from shaftwork.ccode.writer import CodeWriter, Variable
 from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 
-from shaftwork.ccode.printing import function, text_of
+from shaftwork.ccode.c_printing import function, text_of
 
 
 def dispatcher(name: str, arguments: Sequence[str], count: int) -> str:

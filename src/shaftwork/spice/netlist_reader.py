@@ -166,7 +166,10 @@ class _NetlistReader:
                 self._start_voltages[0][0].error("without uic in .tran it holds a node, which is not read")
             )
         self._refuse()
-        if devices.placed and all(REFERENCE not in item.nodes for item in devices.placed):
+        if not devices.placed:
+            why = "A str is the text of a netlist; give a file as pathlib.Path(...)."
+            raise ModelFileError(f"it has no elements. {why}")
+        if all(REFERENCE not in item.nodes for item in devices.placed):
             raise ModelFileError("no element is at node 0, the reference. Join one to it.")
         network = Network(self._title if is_name(self._title) else title)
         for item in _with_names([*devices.placed, *_open_ends(devices.placed)]):
