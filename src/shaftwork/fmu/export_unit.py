@@ -47,6 +47,8 @@ def export_unit(
 ) -> Path:
     """Write an FMU; arguments and errors as of `Model.to_fmu`."""
     place = in_a_folder(path)
+    if not place.name or place.is_dir():
+        raise ParameterError(f"path = '{path}' is a folder. Name a file in it, such as 'train.fmu'.")
     if version not in VERSIONS:
         raise ParameterError(f"version = {version!r} of FMI is none of: {', '.join(VERSIONS)}.")
     if kind not in _KINDS:
@@ -220,5 +222,7 @@ def _write(place: Path, members: Mapping[str, bytes]) -> None:
                 member.external_attr = 0o644 << 16
                 archive.writestr(member, data, zipfile.ZIP_DEFLATED)
         draft.replace(place)
+    except OSError as error:
+        raise ParameterError(f"{place} cannot be written: {error.strerror or error}. Name another file.") from None
     finally:
         draft.unlink(missing_ok=True)
