@@ -191,3 +191,12 @@ def test_times_of_laws_take_units_and_values_refuse_them() -> None:
     ):
         with pytest.raises(sw.ParameterError, match=r"newton|N m"):
             make()
+
+
+@pytest.mark.parametrize("gap", ["1,", "1,a", ",5"])
+def test_a_gap_in_the_first_line_below_the_head_is_refused(tmp_path: Path, gap: str) -> None:
+    """It is none of the lines of the head, which have no numbers there, as units have none."""
+    path = tmp_path / "bench.csv"
+    path.write_text(f"t,x\ns,V\n{gap}\n2,3\n3,4\n", encoding="utf-8")
+    with pytest.raises(sw.ParameterError, match=r"line 3: column '.' holds no number"):
+        sw.Table.from_csv(path, "t", "x")

@@ -134,3 +134,8 @@ def test_what_a_point_over_speed_or_a_report_raises_comes_out_of_their_studies()
     with pytest.raises(OwnError) as caught:
         sw.studies.work_precision(net, "shaft", t_end=0.01, models=["Lumped(4)"], engines=["scipy"], report=fail)
     assert caught.value is error
+
+
+def test_progress_that_is_no_function_is_refused_by_name() -> None:
+    with pytest.raises(sw.ParameterError, match="progress = 3 must be a function of the time"):
+        train().simulate(0.01, progress=3)  # type: ignore[arg-type]

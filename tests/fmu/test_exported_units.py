@@ -339,3 +339,11 @@ def test_our_own_unit_is_a_part_of_a_network(tmp_path: Path) -> None:
     whole.add(sw.Inertia("J2", J=3.0), "wheel")
     motion = net.simulate(2.0, rtol=1e-10)
     np.testing.assert_allclose(motion["J1.omega"], whole.simulate(2.0, rtol=1e-10)["J1.omega"], atol=1e-7)
+
+
+def test_a_folder_is_no_place_for_a_unit(tmp_path: Path) -> None:
+    net = sw.Network("wheel")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    for place in (tmp_path, "."):
+        with pytest.raises(sw.ParameterError, match="is a folder"):
+            net.compile().to_fmu(place)

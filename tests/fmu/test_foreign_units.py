@@ -187,3 +187,23 @@ def test_a_mutated_description_is_read_or_refused_by_name(
         archive.writestr("modelDescription.xml", original[:place] + text + original[place + length :])
     with contextlib.suppress(sw.ParameterError):
         assert len(sw.FMU(path, speed="u", torque="tau").states) <= 2
+
+
+def test_a_binary_that_cannot_be_loaded_leaves_the_working_directory(
+    spring: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    broken = tmp_path / "broken.fmu"
+    with zipfile.ZipFile(spring) as source, zipfile.ZipFile(broken, "w") as target:
+        for name in source.namelist():
+            target.writestr(name, b"x" if name.startswith("binaries/") else source.read(name))
+    monkeypatch.chdir(tmp_path)
+    net = with_spring(broken)
+    with pytest.raises(sw.SimulationError, match="Failed to load"):
+        net.simulate(0.1)
+    assert Path.cwd() == tmp_path
+
+
+@pytest.mark.parametrize(("path", "start"), [(3, {}), (None, {}), ("spring.fmu", 3)])
+def test_arguments_of_other_types_are_refused_by_name(path: object, start: object) -> None:
+    with pytest.raises(sw.ParameterError, match=r"must be the name of a file|must map names to values"):
+        sw.FMU(path, "u", "tau", start)  # type: ignore[arg-type]

@@ -450,3 +450,30 @@ def test_lcapy_laws_may_be_expressions_of_time() -> None:
 def test_what_lcapy_has_besides_is_refused_with_its_line(line: str, words: str) -> None:
     with pytest.raises(sw.ModelFileError, match=words):
         sw.spice.read(f"R1 1 0 1; right\n{line}\n", {"A": 1.0})
+
+
+def test_a_pulse_without_a_width_stays_where_no_end_is_told() -> None:
+    """SPICE takes the end of the analysis for the width; without one the pulse has no end."""
+    circuit = sw.spice.read("t\nV1 a 0 PULSE(0 5 1m 1u 1u)\nR1 a b 1k\nC1 b 0 1u\n.end\n")
+    after = circuit.simulate(0.02, t_eval=[0.02])["b.u"][0]
+    assert after == pytest.approx(5.0 * (1 - np.exp(-19.0)), rel=1e-5)  # the rise of 1 us shifts it by 5e-7
+    with pytest.raises(sw.ModelFileError, match="a period and no width"):
+        sw.spice.read("t\nV1 a 0 PULSE(0 5 1m 1u 1u 0 5m)\nR1 a 0 1k\n.end\n")
+
+
+@pytest.mark.parametrize("law", ["EXP(0 5 1 1m 2 1m)", "SIN(0 5 50 1 1k)"])
+def test_a_law_that_begins_after_a_thousand_of_its_time_constants_is_finite(law: str) -> None:
+    """exp(t_begin / rise) = exp(1000) is no float."""
+    source = sw.spice.read(f"t\nV1 a 0 {law}\nR1 a 0 1\n.tran 1m 1.5\n.end\n").simulate(t_eval=[0.9, 1.002])["a.u"]
+    expected = 5 * (1 - np.exp(-2.0)) if law.startswith("EXP") else 5 * np.exp(-2.0) * np.sin(2 * np.pi * 50 * 0.002)
+    np.testing.assert_allclose(source, [0.0, expected], rtol=1e-9, atol=1e-12)
+
+
+def test_values_that_are_no_mapping_are_refused() -> None:
+    with pytest.raises(sw.ParameterError, match="must map names to numbers"):
+        sw.spice.read("t\nR1 a 0 {x}\n.end\n", [1.0])  # type: ignore[arg-type]
+
+
+def test_an_instance_that_names_no_subcircuit_is_refused_with_its_line() -> None:
+    with pytest.raises(sw.ModelFileError, match="line 2 'X1 r=2': it names no subcircuit"):
+        sw.spice.read("t\nX1 r=2\n.end\n")

@@ -63,13 +63,19 @@ class Columns:
         return [self._converted(number, values, units[number]) for number, values in enumerate((seconds, ys))]
 
     def _places(self, rows: Sequence[tuple[int, list[str]]]) -> tuple[tuple[int, int], list[list[str]], int]:
-        """Numbers of the columns, the rows of their head, and the number of the first row with numbers in them."""
+        """Numbers of the columns, the rows of their head, and the number of the first row with numbers in them.
+
+        Raises:
+            ParameterError: there is no such row, or it has a gap.
+        """
         start, places = 0, _places_in([], self.columns)
-        for count, (_, row) in enumerate(rows):
+        for count, (number, row) in enumerate(rows):
             if places is not None and None not in self._cells(row, places):
                 return places, [head for _, head in rows[start:count]], count
             if any(isinstance(column, str) for column in self.columns):
                 named = _places_in(row, self.columns)
+                if named is None and places is not None and self._cells(row, places) != [None, None]:
+                    self._values(number, row, places)  # refuses a gap in the first line below the head
                 start, places = (start, places) if named is None else (count, named)
         line = f" Its first line is: {', '.join(rows[0][1])}." if rows else " It is empty."
         raise ParameterError(

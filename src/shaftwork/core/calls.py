@@ -9,6 +9,8 @@ from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 from typing import Any, Generic, TypeVar
 
+from shaftwork.core.errors import ParameterError
+
 Result = TypeVar("Result")
 _LOCK = threading.Lock()
 _silent: dict[int, int] = {}
@@ -60,9 +62,14 @@ class Callback:
 
     Args:
         function: of one number; None where nobody is told.
+
+    Raises:
+        ParameterError: it is no function.
     """
 
     def __init__(self, function: Callable[[float], Any] | None) -> None:
+        if function is not None and not callable(function):
+            raise ParameterError(f"progress = {function!r} must be a function of the time in s.")
         self._function = function
 
     def __call__(self, value: float) -> None:

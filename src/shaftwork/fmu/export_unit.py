@@ -48,6 +48,8 @@ def export_unit(
 ) -> Path:
     """Write an FMU; arguments and errors as of `Model.to_fmu`."""
     place = in_a_folder(path)
+    if not place.name or place.is_dir():
+        raise ParameterError(f"path = '{path}' is a folder. Name a file in it, such as 'train.fmu'.")
     if version not in VERSIONS:
         raise ParameterError(f"version = {version!r} of FMI is none of: {', '.join(VERSIONS)}.")
     if kind not in _KINDS:
@@ -209,8 +211,11 @@ def _platform(version: str) -> str:
 
 def _write(place: Path, members: Mapping[str, bytes]) -> None:
     """Write the archive, which takes the place of one that was there once it is whole."""
-    with drafted(place) as draft, zipfile.ZipFile(draft, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, data in members.items():
-            member = zipfile.ZipInfo(name, _DAY)
-            member.external_attr = 0o644 << 16
-            archive.writestr(member, data, zipfile.ZIP_DEFLATED)
+    try:
+        with drafted(place) as draft, zipfile.ZipFile(draft, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name, data in members.items():
+                member = zipfile.ZipInfo(name, _DAY)
+                member.external_attr = 0o644 << 16
+                archive.writestr(member, data, zipfile.ZIP_DEFLATED)
+    except OSError as error:
+        raise ParameterError(f"{place} cannot be written: {error.strerror or error}. Name another file.") from None

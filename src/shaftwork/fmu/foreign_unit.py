@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import shutil
 import threading
@@ -46,6 +47,10 @@ class FMU:
     start: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     def __post_init__(self) -> None:
+        if not isinstance(self.path, str | Path):
+            raise ParameterError(f"path = {self.path!r} must be the name of a file, such as 'motor.fmu'.")
+        if not isinstance(self.start, Mapping):
+            raise ParameterError(f"start = {self.start!r} must map names to values, such as {{'shaft.c': 80.0}}.")
         object.__setattr__(self, "path", Path(self.path).resolve())
         object.__setattr__(self, "start", MappingProxyType(dict(self.start)))
         self._refuse_unfit()
@@ -206,7 +211,8 @@ class _Instance:
         folder = mkdtemp(prefix="shaftwork-fmu-")
         weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
         fmpy.extract(str(fmu.path), unzipdir=folder)
-        self._unit = simulation.instantiate_fmu(folder, description, fmi_type="ModelExchange")
+        with contextlib.chdir("."):  # FMPy stays in the folder of a binary that cannot be loaded
+            self._unit = simulation.instantiate_fmu(folder, description, fmi_type="ModelExchange")
         references = {v.name: v.valueReference for v in description.modelVariables}
         self._input, self._output = [references[input_name]], [references[output_name]]
         newer = str(description.fmiVersion).startswith("3.")

@@ -67,7 +67,8 @@ def _write_netcdf(motion: Solution, names: Sequence[str], text: str, path: Path)
     for name, values in _arriving(motion):
         data[name] = ("t", values, {"long_name": name})
     data[RECORD] = ((), text, {"long_name": "what Shaftwork needs to make the motion again"})
-    data.to_netcdf(path, engine="h5netcdf")
+    sums = {name: {"fletcher32": True} for name in data.variables if data[name].ndim}  # reading refuses flipped bits
+    data.to_netcdf(path, engine="h5netcdf", encoding=sums)
 
 
 def _arriving(motion: Solution) -> Iterator[tuple[str, Array]]:
@@ -93,13 +94,13 @@ def _write_parquet(motion: Solution, names: Sequence[str], text: str, path: Path
     for name, values in _arriving(motion):
         table[name] = values
     table.attrs = {"title": motion.name, "units": units, "along": along, RECORD: text}
-    table.to_parquet(path, engine="pyarrow")
+    table.to_parquet(path, engine="pyarrow", write_page_checksum=True)  # reading refuses flipped bits
 
 
 def _read_parquet(path: Path) -> tuple[str, Array, Columns]:
     library = imported("pandas", "data", "load_solution()")
     imported("pyarrow", "files", "load_solution()")
-    table = library.read_parquet(path, engine="pyarrow")
+    table = library.read_parquet(path, engine="pyarrow", page_checksum_verification=True)
     text, t = table.attrs[RECORD], table.index.to_numpy(dtype=float)
     return text, t, dict(_quantities(table, table.attrs["along"]))
 

@@ -200,7 +200,10 @@ def _expanded(
         if line.command[0] != "x":
             yield line
             continue
-        (*nodes, name), start = _before_pairs(line, 1) if len(line.words) > 1 else ((line.words[0],), 1)
+        names, start = _before_pairs(line, 1)
+        if not names:
+            raise line.error("it names no subcircuit. Write X1 nodes name")
+        *nodes, name = names
         definition = definitions.get(name.lower())
         if definition is None:
             there = first_few([*definitions]) or "none"

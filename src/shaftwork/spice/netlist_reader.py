@@ -114,6 +114,8 @@ def read(
     title, text = ("netlist", source) if isinstance(source, str) else (os.fspath(source), _text_of(Path(source)))
     if dialect not in (None, "spice", "lcapy"):
         raise ParameterError(f"dialect = {dialect!r} must be 'spice', 'lcapy' or None.")
+    if values is not None and not isinstance(values, Mapping):
+        raise ParameterError(f"values = {values!r} must map names to numbers, such as {{'R1': 50.0}}.")
     numbers = {str(name): in_si(f"values['{name}']", value) for name, value in (values or {}).items()}
     try:
         return _NetlistReader(text, numbers, dialect or _dialect_of(text), ideal_diodes).circuit(Path(title).stem)

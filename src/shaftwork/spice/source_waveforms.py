@@ -82,18 +82,23 @@ def _sine(line: NetlistLine, numbers: list[float], _: float, end: float) -> Expr
         raise line.error("SIN has no frequency, and there is no .tran whose end would give one")
     phase = sympy.Float(degrees) * sympy.pi / 180 if degrees else 0
     wave = amplitude * sympy.sin(2 * sympy.pi * frequency * (t - delay if delay else t) + phase)
-    wave *= sympy.exp(-damping * (t - delay)) if damping else 1
+    since = sympy.Max(0, t - delay) if delay > 0 else t - delay
+    wave *= sympy.exp(-damping * since) if damping else 1
     return offset + (Piecewise((amplitude * sympy.sin(phase), t < delay), (wave, True)) if delay > 0 else wave)
 
 
 def _pulse(line: NetlistLine, numbers: list[float], step: float, end: float) -> Expr:
     low, high, delay = *numbers[:2], _or(numbers, 2, 0.0)
     rise, fall = (_positive(numbers, place, step) for place in (3, 4))
-    width = _positive(numbers, 5, end or rise)
+    width = _positive(numbers, 5, end)
     period = _positive(numbers, 6, 0.0)
-    corners = ((0.0, low), (rise, high), (rise + width, high), (rise + width + fall, low))
+    corners: tuple[tuple[float, float], ...] = ((0.0, low), (rise, high))
+    if width:  # neither it nor an end of the analysis is told: it stays
+        corners += ((rise + width, high), (rise + width + fall, low))
     if not period or period > end > 0:
         return Table(*zip(*((delay + time, value) for time, value in corners), strict=True))(t)
+    if not width:
+        raise line.error("PULSE has a period and no width, and there is no .tran whose end would give one")
     if period < rise + width + fall:
         raise line.error(f"PULSE has a period of {period:g} s, shorter than its pulse of {rise + width + fall:g} s")
     count = int((end - delay) / period) + 1 if end else MOST_PERIODS + 1
@@ -125,8 +130,9 @@ def _exponential(_: NetlistLine, numbers: list[float], step: float, __: float) -
     low, high, begin = *numbers[:2], _or(numbers, 2, 0.0)
     rise, back = _positive(numbers, 3, step), _or(numbers, 4, begin + step)
     fall = _positive(numbers, 5, step)
+    # of Max nothing is taken out of the exponential, where it would be too large for a float
     return (
         low
-        + (high - low) * Piecewise((0, t < begin), (1 - sympy.exp(-(t - begin) / rise), True))
-        + (low - high) * Piecewise((0, t < back), (1 - sympy.exp(-(t - back) / fall), True))
+        + (high - low) * Piecewise((0, t < begin), (1 - sympy.exp(-sympy.Max(0, t - begin) / rise), True))
+        + (low - high) * Piecewise((0, t < back), (1 - sympy.exp(-sympy.Max(0, t - back) / fall), True))
     )
