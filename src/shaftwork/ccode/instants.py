@@ -67,7 +67,11 @@ class Instants:
         for place in unsolved_places(law, self._still):
             if isinstance(place, Pow) and place.exp.is_number and 0 < place.exp <= MOST_DEGREE:
                 yield from self._pulses(place.base)
-            else:
+            elif (
+                not isinstance(place, Pow)
+                or place.exp.has(TIME)  # of pieces of lines a power peaks where one ends or is zero
+                or any(line(one) is None for one in _factors(place.base))
+            ):
                 yield place
 
     def _sort(self, part: str, argument: Expr, levels: tuple[float, ...]) -> None:
