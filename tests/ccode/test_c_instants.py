@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sympy
-from sympy import Abs, Max, Piecewise, cos, floor, pi, sin, sqrt
+from sympy import Abs, Max, Min, Piecewise, cos, floor, pi, sin, sqrt
 
 import shaftwork as sw
 from shaftwork.ccode.c_export import c_code
@@ -118,6 +118,7 @@ FOLLOWED = {
     "short pulses of a sawtooth": Piecewise((5000.0, 5 * T + 0.6 - floor(5 * T + 0.6) < 0.003), (0.0, True)),
     "a pulse beside an instant": Piecewise((9e3, Abs(T - 0.5) < 1e-4), (0.0, True)),
     "a pulse at an angle": 1e4 * sympy.exp(-(((sin(T) - 0.377) / 1e-4) ** 2)),
+    "a limited ramp": 50 * Max(0, Min(1, (T - 0.3) / 1e-3)),
     "a smooth root": 3 * sqrt(1 + T**2),
 }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from sympy import Abs, Expr, Min, Mul, Pow, Symbol, asin, cos, floor, pi, simplify, sin
+from sympy import Abs, Expr, Max, Min, Mul, Piecewise, Pow, Symbol, asin, cos, floor, pi, simplify, sin
 
 from shaftwork.ccode.c_printing import Statements, array, function
 from shaftwork.components.discontinuities import line, narrow_places, switches, unsolved_places
@@ -67,7 +67,11 @@ class Instants:
         for place in unsolved_places(law, self._still):
             if isinstance(place, Pow) and place.exp.is_number and 0 < place.exp <= MOST_DEGREE:
                 yield from self._pulses(place.base)
-            else:
+            elif (
+                not isinstance(place, Pow)
+                or place.exp.has(TIME)  # of pieces of lines a power peaks where one ends or is zero
+                or any(line(one) is None for one in _factors(place.base))
+            ):
                 yield place
 
     def _sort(self, part: str, argument: Expr, levels: tuple[float, ...]) -> None:
@@ -107,12 +111,18 @@ class Instants:
 
 
 def _factors(expression: Expr) -> Iterator[Expr]:
-    """What changes its sign in time where an expression does; |x| - a does so where x passes a or -a."""
+    """What changes its sign in time where an expression does.
+
+    |x| - a does so where x passes a or -a, and Min(x, y) - a nowhere but where x or y passes it.
+    """
     for factor in Mul.make_args(expression):
         level, moving = factor.as_independent(TIME, as_Add=True)
         size, moving = moving.as_independent(TIME, as_Add=False)
         if isinstance(moving, Abs):
             yield from (size * moving.args[0] + level, size * moving.args[0] - level)
+        elif isinstance(moving, Max | Min | Piecewise):
+            for one in moving.args if not isinstance(moving, Piecewise) else (value for value, _ in moving.args):
+                yield from _factors(size * one + level)
         elif factor.has(TIME):
             yield factor
 
