@@ -347,3 +347,15 @@ def test_a_folder_is_no_place_for_a_unit(tmp_path: Path) -> None:
     for place in (tmp_path, "."):
         with pytest.raises(sw.ParameterError, match="is a folder"):
             net.compile().to_fmu(place)
+
+
+def test_a_quantity_named_like_a_parameter_is_told_from_it(tmp_path: Path) -> None:
+    """The torque of a load is `load.tau`, and so is its largest one, a parameter."""
+    net = sw.Network("held")
+    net.add(sw.TorqueSource("motor", tau=20.0), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.CoulombLoad("load", tau=30.0), "a")
+    for outputs in (None, ["load.tau"]):
+        net.compile().to_fmu(tmp_path / "held.fmu", outputs=outputs)
+        rows = fmpy.simulate_fmu(tmp_path / "held.fmu", stop_time=0.1, output=["load.tau_now"], start_values={})
+        assert rows["load.tau_now"][-1] == -20.0

@@ -90,7 +90,7 @@ def _dependencies(model: Model, code: CCode) -> dict[str, tuple[str, ...]]:
     equations = EquationSet(model.with_values(inputs) if inputs else model)
     rates = {state.name: rate for state, rate in zip(equations.rows.states, equations.rows.rates, strict=True)}
     laws = {f"der({name})": rate for name, rate in rates.items()}
-    laws |= {variable.name: equations.observables.quantity(variable.name) for variable in code.outputs}
+    laws |= {_shown(name, code): equations.observables.quantity(name) for name, *_ in code.outputs}
     moving = (*rates, *inputs)
     read = {
         name: {symbol.name for symbol in law.free_symbols} for name, law in laws.items()
@@ -107,7 +107,7 @@ def _interface(
 ) -> UnitInterface:
     """What the unit shows: states that are outputs as well, and other outputs."""
     states = {variable.name for variable in code.states}  # only asked for membership
-    others = states | {variable.name for variable in (*code.inputs, *code.parameters)}
+    others = states | {variable.name for variable in code.inputs}
     wanted = tuple(variable.name for variable in code.outputs) if outputs is None else tuple(outputs)
     token = hashlib.sha256(f"{code.header}\0{code.source}".encode()).hexdigest()
     return UnitInterface(
@@ -117,12 +117,17 @@ def _interface(
         parameters=tuple(UnitVariable(*variable) for variable in code.parameters),
         inputs=tuple(UnitVariable(*variable) for variable in code.inputs),
         states=tuple(UnitVariable(v.name, v.unit, 0.0) for v in code.states),
-        outputs=tuple(UnitVariable(v.name, v.unit) for v in code.outputs if v.name not in others),
+        outputs=tuple(UnitVariable(_shown(v.name, code), v.unit) for v in code.outputs if v.name not in others),
         shown=frozenset(states & {*wanted}),
         indicators=code.guards,
         dependencies=dependencies,
         t_end=t_end,
     )
+
+
+def _shown(name: str, code: CCode) -> str:
+    """The name of an output, told from a parameter: "load.tau_now" is what the load of `load.tau` gives at an instant."""
+    return f"{name}_now" if any(name == parameter.name for parameter in code.parameters) else name
 
 
 def _sources(unit: UnitInterface, code: CCode, version: str) -> dict[str, str]:
@@ -136,7 +141,7 @@ def _sources(unit: UnitInterface, code: CCode, version: str) -> dict[str, str]:
 
 def _configuration(unit: UnitInterface, code: CCode) -> str:
     """The header that tells the same code for all models which one this is."""
-    places = {variable.name: k for k, variable in enumerate(code.outputs)}
+    places = {_shown(variable.name, code): k for k, variable in enumerate(code.outputs)}
     sizes = {
         "PARAMETERS": len(unit.parameters),
         "INPUTS": len(unit.inputs),
