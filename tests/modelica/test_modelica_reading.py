@@ -122,6 +122,8 @@ end Supported;
     a, b, s = (motion[f"{name}.omega"][-1] for name in "abs")
     assert a - s == pytest.approx(ratio * (b - s), rel=1e-9)
     assert a + 2 * b + 3 * s == pytest.approx(1.0, rel=1e-9)  # the gear stands on nothing outside: momentum is kept
+    with pytest.raises(sw.ModelFileError, match="line 2: the support of 'gear' is joined to nothing"):
+        sw.read_modelica(text.replace("  connect(gear.support, s.flange_a);\n", ""))
 
 
 @share_of_examples(1.0)

@@ -126,7 +126,7 @@ def _interface(
 
 
 def _shown(name: str, code: CCode) -> str:
-    """The name of an output, told from a parameter: "load.tau_now" is what the load of `load.tau` gives at an instant."""
+    """The name of an output, told from that of a parameter: `load.tau_now` is the torque at an instant."""
     return f"{name}_now" if any(name == parameter.name for parameter in code.parameters) else name
 
 

@@ -311,6 +311,11 @@ class _Reading:
         if missing := [key for key, value in instance.values.items() if value is REQUIRED]:
             raise fault(line, f"'{name}' has no value of '{missing[0]}'. Give it in the file.")
         parts = self._built(lambda: list(entry.make(self._names[name], instance.values)), line, name)
+        supports = (one.value for one in instance.declaration.modifiers if one.name.startswith("useSupport"))
+        if f"{name}.support" not in self._joined and any(
+            v is not None and self._values.of(v) is True for v in supports
+        ):
+            raise fault(line, f"the support of '{name}' is joined to nothing. Join it to a Fixed, or leave it out.")
         if f"{name}.support" in self._joined and self._nodes.of(f"{name}.support") not in frame:
             if not all(map(can_be_supported, parts)):
                 raise fault(line, f"the support of '{name}' is not at a Fixed, which alone is read.")
