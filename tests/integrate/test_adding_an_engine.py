@@ -146,7 +146,7 @@ def test_where_parts_change_their_mode_it_is_refused_unless_its_entry_says_that_
 ) -> None:
     assert report["modes"] == (
         "The engine 'rk4-alone' follows no parts that change their mode (load). "
-        "Take one of: heyoka, rk4, scipy, scipy-radau, sundials."
+        "Take one of: heyoka, numba, rk4, scipy, scipy-radau, sundials."
     )
 
 

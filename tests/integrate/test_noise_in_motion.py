@@ -17,7 +17,7 @@ from shaftwork.core.errors import ParameterError
 from shaftwork.integrate import choice
 from shaftwork.integrate.problem import Problem
 
-ENGINES = ["heyoka", "numba", "scipy", "sundials"]
+ENGINES = ["heyoka", "scipy", "sundials"]
 # Of the largest value, in tolerances. The stiff shaft makes 100 of scipy's out of 10 of a speed, and the errors of
 # CVODE's formulas add up over thousands of steps: 0.04, 103 and 2300 were met at 1e-9, and about as many from 1e-6 to
 # 1e-11. A step of the load that is missed by one pitch is wrong by 1e-2, which is 1e7 of them.

@@ -23,6 +23,9 @@ REFUSED = {
     "Backlash": "Give its flanks a stiffness c",
     "TranslationalBacklash": "Give its flanks a stiffness c",
     "BLDCMotor": "changes its mode in a way that is not written",
+    "VoltageControlledSwitch": "has no Modelica form",
+    "StateSpaceController": "which no model of a part can",
+    "TransferFunctionController": "which no model of a part can",
 }
 WITHOUT_MASS = ("DryFriction", "Brake", "Clutch")
 """Their beds have no inertia at their nodes, where their acceleration would be anything."""

@@ -27,6 +27,10 @@ from tests.beds import bed_of
 API = Path(__file__).parents[2] / "docs" / "api.md"
 NOT_STORED = {
     "Session": "a conversation with a page: threads, and what it is asked at the moment",
+    "Simulation": "it stands in the midst of a run; `save_state` gives what can be stored",
+    "FMU": "the file of another tool, which is unpacked in this process",
+    "FMUTorque": "a part of an FMU",
+    "FMUSpeed": "a part of an FMU",
 }
 """Public classes that stay in their process, and why."""
 COMPILED = ("again", "dense", "observer", "reader", "extremes")
@@ -79,6 +83,9 @@ def roots() -> Iterator[Any]:
     motion, through_phases = model.simulate(1.0), phased.simulate(1.0)
     f, orders = np.linspace(1.0, 30.0, 5), {"shaft.c": [9e3, 1e4]}
     yield from (plain, hybrid, model, phased, motion, through_phases)
+    yield model.start().save_state()
+    yield sw.spice.read("divider\nV1 a 0 5\nR1 a b 1k\nC1 b 0 1u\n.end\n")
+    yield sw.read_modelica("model M\n  Modelica.Mechanics.Rotational.Components.Inertia J1(J = 1);\nequation\nend M;\n")
     yield phased.phase(through_phases.phases[-1].name)
     yield phased.phase(through_phases.phases[0])
     equations, switching = plain.equations(), hybrid.equations()

@@ -87,6 +87,8 @@ def test_a_dual_has_the_laws_of_its_network(net: sw.Network) -> None:
         assert all(one.kind == "not planar" or "can hold too" in one.message for one in error.problems)  # noqa: PT017
         return
     assert dual.analogy is not None
+    if any(problem.kind == "massless node" for problem in dual.check()):
+        return  # a friction at a prescribed speed: nothing in its mesh answers the source
     expected, found = (one.simulate(TIMES[-1], t_eval=TIMES, rtol=1e-12) for one in (net, dual))
     wanted = {name: expected[name] for name in dual.analogy.quantities if name in expected}
     # the two may have other states, so that they take other steps

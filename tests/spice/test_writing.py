@@ -113,7 +113,7 @@ def test_laws_and_parts_that_switch_move_in_ngspice_as_here(name: str) -> None:
 @pytest.mark.slow
 @NEEDS_NGSPICE
 @settings(max_examples=50, suppress_health_check=[HealthCheck.too_slow])
-@given(networks(max_inertias=12))
+@given(networks(max_inertias=12, translation=False))  # ngspice stops where a drum pulls an undamped rope
 def test_random_linear_networks_move_in_ngspice_as_here(pieces: Network) -> None:
     """The trapezoidal rule is of second order: of what is left at one step, a sixteenth at a quarter of it."""
     net = network_of(pieces)

@@ -77,7 +77,7 @@ class ModelicaValues:
     def _plain(self, value: Any, term: SyntaxTerm) -> Any:
         if isinstance(value, bool | str | list):
             return value
-        expression = sympy.sympify(value)
+        expression = sympy.sympify(value, strict=True)
         if expression in (sympy.true, sympy.false):
             return bool(expression)
         if expression.has(sympy.nan, sympy.zoo, sympy.oo, sympy.I, -sympy.oo):
