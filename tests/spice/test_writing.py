@@ -113,11 +113,15 @@ def test_laws_and_parts_that_switch_move_in_ngspice_as_here(name: str) -> None:
 @pytest.mark.slow
 @NEEDS_NGSPICE
 @settings(max_examples=50, suppress_health_check=[HealthCheck.too_slow])
-@given(networks(max_inertias=12, translation=False))  # ngspice stops where a drum pulls an undamped rope
+@given(networks(max_inertias=12))
 def test_random_linear_networks_move_in_ngspice_as_here(pieces: Network) -> None:
     """The trapezoidal rule is of second order: of what is left at one step, a sixteenth at a quarter of it."""
     net = network_of(pieces)
-    coarse, fine = (errors(net, 0.1, steps) for steps in (500, 2000))
+    try:
+        coarse, fine = (errors(net, 0.1, steps) for steps in (500, 2000))
+    except RuntimeError as error:  # ngspice itself gives up some trains of undamped springs, and says so
+        assert "Timestep too small" in str(error)  # noqa: PT017
+        return
     # what ngspice solves to is 1e-6 of a quantity, of small ones 1e-9 V
     assert np.all(fine < np.maximum(0.25 * coarse, 1e-4))
 
