@@ -180,7 +180,8 @@ def normal_tree(graph: CircuitGraph) -> NormalTree:
     locked: list[tuple[int, tuple[int, ...]]] = []
     columns = {branch.index: column_of(graph, branch) for branch in graph.branches}
     balances = {branch.index: balance_of(graph, branch) for branch in graph.branches} if lossy else columns
-    for branch in sorted(graph.branches, key=partial(_rank, graph)):  # stable: keeps the order of the table
+    controlled = {branch.part for branch in graph.branches if branch.template.through}
+    for branch in sorted(graph.branches, key=partial(_rank, graph, controlled)):  # stable: keeps the order of the table
         kind, index = branch.template.kind, branch.index
         reduced = work.reduce(columns[index])
         opposed = torques.reduce(balances[index]) if lossy else reduced
@@ -212,7 +213,7 @@ def normal_tree(graph: CircuitGraph) -> NormalTree:
     )
 
 
-def _rank(graph: CircuitGraph, branch: GraphBranch) -> tuple[Kind, int]:
+def _rank(graph: CircuitGraph, controlled: set[int], branch: GraphBranch) -> tuple[Kind, int]:
     """By what branches come into the tree: gears before what holds by a mode, which carries nothing beside them.
 
     Of that, gears that rub come first: beside a friction which takes all, no torque in their teeth would tell whether
@@ -220,7 +221,7 @@ def _rank(graph: CircuitGraph, branch: GraphBranch) -> tuple[Kind, int]:
     """
     kind, modes = branch.template.kind, graph.parts[branch.part].modes
     if kind is Kind.CONDUCTANCE:
-        return kind, int(any(graph.branches[k].template.through for k in graph.parts[branch.part].branches))
+        return kind, int(branch.part in controlled)
     if kind is not Kind.COUPLING or not modes:
         return kind, 0
     return kind, 1 if any(element.passes_on for element in modes) else 2
