@@ -108,8 +108,9 @@ class SetFunctions:
     def _jacobian(self) -> str:
         targets, slopes, size = list[str](), list[Expr](), len(self.layout.states)
         for row, rate in zip(self.places, self.rows.rates, strict=True):
+            symbols = rate.free_symbols
             for column, state in zip(self.places, self.rows.states, strict=True):
-                if rate.has(state):
+                if state in symbols:
                     targets.append(f"slopes[{row * size + column}]")
                     slopes.append(slope(rate, state))
         return self.written(
