@@ -46,7 +46,7 @@ for rtol in (1e-4, 1e-6, 1e-8):
     report[f"crane {rtol:g}"] = [sol.engine, error, sol.energy_residual]
 
 net = sw.Network("two masses")
-net.add(sw.TorqueSource("motor", tau=sw.Step(0.0, 10.0, 0.3)), "rotor")
+net.add(sw.TorqueSource("motor", tau=sw.Step(10.0, start=0.3)), "rotor")
 net.add(sw.Inertia("J1", J=2.0), "rotor")
 net.add(sw.Spring("shaft", c=100.0, d=1.0), "rotor", "wheel")
 net.add(sw.Inertia("J2", J=3.0), "wheel")

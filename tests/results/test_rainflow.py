@@ -245,7 +245,7 @@ def test_the_matrix_and_the_spectrum_hold_every_cycle() -> None:
 @pytest.fixture(scope="module")
 def line() -> sw.Solution:
     net = sw.Network("line")
-    net.add(sw.TorqueSource("motor", tau=sw.Step(0.0, 25.0, 0.01)), "a")
+    net.add(sw.TorqueSource("motor", tau=sw.Step(25.0, start=0.01)), "a")
     net.add(sw.Inertia("Je", J=0.025), "a")
     net.add(
         sw.Shaft("line", length=1.0, diameter=0.02, density=7900.0, shear_modulus=77.5e9, model=sw.Lumped(4)), "a", "b"
