@@ -144,10 +144,9 @@ def test_a_machine_with_its_terminals_joined_is_allowed() -> None:
 def test_a_bad_value_is_said_with_unit_and_bounds(value: Any, words: str) -> None:
     problem = typed(mechanics.Inertia("J3", J=value), "wheel")
     assert words in problem.message
-    assert (problem.kind, problem.hint) == (
-        "parameter",
-        "Give J (moment of inertia, also over its angle or time) in kg*m^2, at least 0.",
-    )
+    law = ", or a formula such as 20 * sympy.sin(3 * sw.t)" if isinstance(value, str) else ""
+    hint = f"Give J (moment of inertia, also over its angle or time) in kg*m^2, at least 0{law}."
+    assert (problem.kind, problem.hint) == ("parameter", hint)
     assert (problem.parts, problem.nodes) == (("J3",), ("wheel",))
 
 

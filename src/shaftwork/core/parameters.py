@@ -160,7 +160,7 @@ class Parameter:
         try:
             return self.record.read(value), None
         except ParameterError as error:
-            return value, f"is none: {str(error).rstrip('.')}"
+            return value, f"cannot be read: {str(error).rstrip('.')}"
 
     def _from_quantity(self, value: Any) -> tuple[Any, str | None]:
         magnitude, objection = converted(value, self.unit)

@@ -215,7 +215,8 @@ class _Examination:
         unit = " as a pure number" if declared.unit == "1" else f" in {declared.unit}"
         unit = "" if declared.record is not None else unit
         shown = "" if kind == "wrong unit" else f" = {reprlib.repr(value)}"
-        hint = f"Give {name} ({declared.meaning}){unit}{f', {declared.bounds}' if declared.bounds else ''}."
+        law = ", or a formula such as 20 * sympy.sin(3 * sw.t)" if declared.law and isinstance(value, str) else ""
+        hint = f"Give {name} ({declared.meaning}){unit}{f', {declared.bounds}' if declared.bounds else ''}{law}."
         self.report(kind, f"{title(part)}: {name}{shown} {objection}.", hint, placed, name)
 
     def _faults_of(self, part: Component, values: Mapping[str, Any]) -> tuple[Fault, ...]:
