@@ -275,5 +275,5 @@ def test_small_motions_of_many_columns_are_not_taken_for_the_motion_itself(monke
     net.add(shaft, "a", "b")
     model = net.compile()
     whole = model.linearize(outputs=("line.tau_a", "J.omega")).C
-    monkeypatch.setattr("shaftwork.codegen.array_form.elements.AT_ONCE", 100)
+    monkeypatch.setattr("shaftwork.codegen.array_form.elements.blocks.__defaults__", (100,))
     np.testing.assert_array_equal(model.linearize(outputs=("line.tau_a", "J.omega")).C, whole)

@@ -18,7 +18,6 @@ from shaftwork.codegen.start_values import initial_state
 from shaftwork.core.errors import ShaftworkError
 from shaftwork.live.page import served_page
 from shaftwork.live.session import POINTS, Session
-from shaftwork.live.sliders import SPAN
 from shaftwork.results.observer import Array
 from shaftwork.scenes import SCENES
 from tests.properties.examples import share_of_examples
@@ -125,7 +124,7 @@ def test_warnings_of_the_library_are_answers_too() -> None:
 
 def test_a_slider_spans_a_factor_to_both_sides_within_the_bounds_of_its_parameter(crane: Session) -> None:
     stiffness, efficiency = crane.sliders["shaft.c"], crane.sliders["motor.efficiency"]
-    assert (stiffness.low, stiffness.high) == (24206.0 / SPAN, 24206.0 * SPAN)
+    assert (stiffness.low, stiffness.high) == (24206.0 / 4, 24206.0 * 4)
     assert (efficiency.unit, efficiency.value, efficiency.high) == ("1", 0.95, 1.0)
     parts = {part.name: part for part in crane.network.parts}
     declared = {name: parts[name.partition(".")[0]].declared[name.partition(".")[2]] for name in crane.sliders}

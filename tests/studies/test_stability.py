@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 
 import shaftwork as sw
 from docs.generate import extreme_drives
-from shaftwork.studies.stability import RIGHT, SAME, distances, judge, stability
+from shaftwork.studies.stability import FAITHFUL, RIGHT, distances, judge, stability
 from shaftwork.studies.stability_cases import CASES, TORQUE, Case
 from shaftwork.studies.truth import ENDS, exact, predicted
 from tests.reference.extreme_drives import continuous
@@ -212,13 +212,13 @@ def test_a_spoilt_run_is_called_wrong(model: sw.Lumped, spoilt: object) -> None:
 @pytest.mark.parametrize(
     ("error", "deviation", "energy", "verdict"),
     [
-        (RIGHT / 2, SAME / 2, SAME / 2, "right"),
+        (RIGHT / 2, FAITHFUL / 2, FAITHFUL / 2, "right"),
         (RIGHT / 2, np.nan, np.nan, "right"),
-        (RIGHT / 2, 2 * SAME, np.nan, "wrong"),
-        (RIGHT / 2, SAME / 2, 2 * SAME, "wrong"),
-        (2 * RIGHT, SAME / 2, np.nan, "coarse"),
+        (RIGHT / 2, 2 * FAITHFUL, np.nan, "wrong"),
+        (RIGHT / 2, FAITHFUL / 2, 2 * FAITHFUL, "wrong"),
+        (2 * RIGHT, FAITHFUL / 2, np.nan, "coarse"),
         (2 * RIGHT, np.nan, np.nan, "unknown"),
-        (2 * RIGHT, np.nan, 2 * SAME, "wrong"),
+        (2 * RIGHT, np.nan, 2 * FAITHFUL, "wrong"),
         (np.nan, np.nan, np.nan, "wrong"),
         (np.inf, np.inf, np.nan, "wrong"),
     ],

@@ -15,11 +15,7 @@ from shaftwork.components.modes import ANEW, Mode, ModeChoice, Modes
 from shaftwork.network.graph import GraphPart, resolve
 from shaftwork.network.kinds import Kind
 from shaftwork.network.templates import BranchTemplate, make_template
-
-SAME = 1e-9
-"""So far, in parts of it, a limit may be from the torque at no speed: it is a hundred roundings above."""
-SOME_TIMES = (0.37, 1.9, 27.3)
-"""s, at which the two are compared."""
+from shaftwork.numerics.tolerances import TYPED
 
 
 @dataclass(frozen=True)
@@ -133,9 +129,9 @@ class DualModes:
             rubs = Add(*(one.law for one in branches if one.kind in (Kind.LAW, Kind.THROUGH_SOURCE)))
             (limit,) = (leave.when for leave in self._joined[0].leaves if leave.when.diff(THROUGH) == sign)
             apart = limit.xreplace({THROUGH: Integer(0)}) + sign * rubs.subs(ACROSS, 0)
-            for time in SOME_TIMES:
+            for time in (0.37, 1.9, 27.3):  # s, that no law singles out
                 at = {**numbers, TIME: Float(time)}
-                if abs(apart.subs(at).evalf()) > SAME * abs(rubs.subs(ACROSS, 0).subs(at).evalf()):
+                if abs(apart.subs(at).evalf()) > TYPED * abs(rubs.subs(ACROSS, 0).subs(at).evalf()):
                     return False
         return True
 

@@ -30,16 +30,9 @@ if TYPE_CHECKING:
 Complex = NDArray[np.complex128]
 RATE = 20
 """Pictures per second."""
-SAMPLES = 20
-"""Of a speed, from which its angle is integrated, for each picture."""
-MOST_PICTURES = 2000
 FORMATS = (".gif", ".mp4", ".html")
-SWING = 2.0
-"""Of a mode as shown, s."""
 LARGEST_SWING = np.pi / 4
 """As shown, rad."""
-DOTS = 80
-"""Of a picture in HTML, per inch."""
 PLAYER = Template("""<div class="shaftwork-animation"><img alt="moving picture" style="max-width: 100%"><br>
 <button type="button">play / pause</button>
 <input type="range" aria-label="picture" min="0" max="$last" value="0" style="width: 60%">
@@ -115,7 +108,7 @@ class Animation:
         for number in range(self.count):
             self.draw(number)
             stream = io.BytesIO()
-            self.figure.savefig(stream, format="png", dpi=DOTS)
+            self.figure.savefig(stream, format="png", dpi=80)
             pictures.append(f"data:image/png;base64,{b64encode(stream.getvalue()).decode()}")
         return PLAYER.substitute(pictures=json.dumps(pictures), last=self.count - 1, wait=round(1000 / RATE))
 
@@ -175,9 +168,10 @@ def animate(
     if not train.nodes:
         raise ParameterError(f"Nothing in '{reader.title}' rotates, so there are no discs to show.")
     times = np.linspace(*span, count)
-    fine = np.linspace(*span, SAMPLES * (count - 1) + 1)
+    samples = 20  # of a speed for each picture: its angle is integrated from them
+    fine = np.linspace(*span, samples * (count - 1) + 1)
     shown = train.turning(fine, lambda name: reader.quantity(name)(fine), seconds)
-    angles = shown.angles[::SAMPLES]
+    angles = shown.angles[::samples]
     figure = new_figure("Solution.animate()", max(6.0, 1.3 * len(train.nodes)), 4.6)
     discs, below = figure.subplots(2, 1, height_ratios=(3, 2))
     spokes = draw_discs(discs, [node.name for node in train.nodes])
@@ -218,7 +212,8 @@ def swinging(title: str, shapes: Mapping[str, complex], seconds: float) -> Anima
     spokes = draw_discs(figure.subplots(), tuple(shapes))
     amplitudes = np.array(list(shapes.values()))
     largest = np.abs(amplitudes).max() or 1.0
-    draw = _ModePicture(LARGEST_SWING * amplitudes / largest, spokes, max(1, round(seconds / SWING)) / count)
+    swings = max(1, round(seconds / 2.0))  # which take 2 s, as eyes follow them
+    draw = _ModePicture(LARGEST_SWING * amplitudes / largest, spokes, swings / count)
     draw(0)
     lettered(figure)
     return Animation(figure, count, draw)
@@ -230,9 +225,9 @@ def pictures_of(seconds: float) -> int:
     Raises:
         ParameterError: too few or too many.
     """
-    lasting = in_si("seconds", seconds, "s")
-    if not 0.1 <= lasting <= MOST_PICTURES / RATE:
-        raise ParameterError(f"seconds = {lasting:g} must be from 0.1 to {MOST_PICTURES / RATE:g}.")
+    lasting, longest = in_si("seconds", seconds, "s"), 2000 / RATE  # of 2000 pictures
+    if not 0.1 <= lasting <= longest:
+        raise ParameterError(f"seconds = {lasting:g} must be from 0.1 to {longest:g}.")
     return round(lasting * RATE)
 
 

@@ -22,9 +22,6 @@ Say = Callable[[str], None]
 Data = Mapping[str, Any]
 """A result for machines."""
 
-FALLBACK_END = 10.0
-"""End time of a model file when none is given, s."""
-
 
 @dataclass(frozen=True)
 class Command:
@@ -139,7 +136,7 @@ def end_of(options: Namespace, scene: Scene | None) -> float:
     Raises:
         ParameterError: no motion can end then.
     """
-    from shaftwork.pipeline.arguments import time_span
+    from shaftwork.pipeline.arguments import FALLBACK_END, time_span
 
     end = options.t_end if options.t_end is not None else scene.t_end if scene else FALLBACK_END
     return time_span(0.0, end)[1]

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from shaftwork.cli.command import FALLBACK_END, Data, Say, command, load
+from shaftwork.cli.command import Data, Say, command, load
 from shaftwork.core.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -95,6 +95,8 @@ def export(options: Namespace, say: Say) -> Data:
         return _model_file(options, say)
     if options.file is not None:
         raise ParameterError(f"'{options.file}' and --{chosen[0].option} both name a place to write to. Leave out one.")
+    from shaftwork.pipeline.arguments import FALLBACK_END
+
     net, scene = load(options)
     for one in chosen:
         end = scene.t_end if scene else FALLBACK_END

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from shaftwork.cli.command import FALLBACK_END, Data, Say, command, load
+from shaftwork.cli.command import Data, Say, command, load
 
 if TYPE_CHECKING:
     from shaftwork.equations.records import Equations
@@ -29,6 +29,7 @@ def scenes(_: Namespace, say: Say) -> Data:
 def check(options: Namespace, say: Say) -> Data:
     """What can be said of a network before anything is simulated."""
     from shaftwork.cli.check_report import structure_report
+    from shaftwork.pipeline.arguments import FALLBACK_END
 
     net, scene = load(options)
     model, t_end = net.compile(), scene.t_end if scene else FALLBACK_END

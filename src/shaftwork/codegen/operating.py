@@ -19,7 +19,7 @@ from shaftwork.network.netlist import listed
 from shaftwork.numerics.tolerances import EPS, SAME
 
 TINY = float(np.finfo(float).tiny)
-AT_ONCE = 1e-12
+INSTANT = 1e-12
 """A time, s, that is none beside any motion."""
 
 
@@ -82,7 +82,7 @@ def steady_state(bound: BoundArrays, start: Array, t: float, *, ends: Callable[[
         new = counts * bound.rhs(t, x + trial)
         defect = length(trial / h - new) / max(length(rate), length(vanishing), TINY)
         over = ends is not None and ends(x + trial)
-        is_right = defect < WAY.defect or (h < AT_ONCE and np.isfinite(defect))
+        is_right = defect < WAY.defect or (h < INSTANT and np.isfinite(defect))
         if not is_right or (over and h > WAY.first):
             h = h / 4
             if h < TINY:  # a law that is nowhere finite on the way leaves none

@@ -14,7 +14,7 @@ from shaftwork.codegen.array_form.arrays import BoundArrays
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.array_form.linear_readings import GivenSpeeds, LinearQuantity, LinearRow
 from shaftwork.codegen.array_form.recovery import BranchHistory
-from shaftwork.codegen.operating import AT_ONCE, energy_weights
+from shaftwork.codegen.operating import INSTANT, energy_weights
 from shaftwork.codegen.start_names import StartNames, speeds_inside
 from shaftwork.core.errors import ParameterError
 from shaftwork.numerics.tolerances import TYPED
@@ -202,7 +202,7 @@ class Start:
 
     def _drift(self, quantity: LinearQuantity) -> float:
         """How far sources move a quantity at once: 3 sin(12 t) is soon not quite the zero that is given."""
-        times = np.array([self._t, self._t + AT_ONCE])
+        times = np.array([self._t, self._t + INSTANT])
         return float(np.ptp(quantity.read(BranchHistory(self._bound, times, np.array([self._x, self._x])))))
 
     def _changes(self, rows: Array, gaps: Array, movable: Any, *, is_across: bool) -> Array:

@@ -146,7 +146,7 @@ class Switching:
         self.places = sorted({place for one in every for place in one.places})
         """Of the parameters on which the instants depend."""
         self._form = form
-        self._timelines = BoundedCache[tuple[bytes, float, float, bool], Timeline](8)
+        self._timelines = BoundedCache[tuple[bytes, float, float, bool], Timeline]()
 
     def known(self, p: Array) -> tuple[float, ...]:
         """Times in s of switches that are linear in time, increasing: they are known without a run.

@@ -141,10 +141,10 @@ class BoundedCache(Generic[Key, Value]):
     Threads that need the same key at once may compute it twice, and all get the first value.
 
     Args:
-        most: how many are kept.
+        most: how many are kept; by default what a user goes back to, as models of other structure.
     """
 
-    def __init__(self, most: int) -> None:
+    def __init__(self, most: int = 8) -> None:
         self._most, self._values, self._lock = most, dict[Key, Value](), threading.Lock()
 
     def __call__(self, key: Key, make: Callable[[], Value]) -> Value:

@@ -11,10 +11,8 @@ from typing import Any
 
 LINES, COLUMNS = 25, 100
 """Size of the screen."""
-ROWS = 12
-"""Of a printed table that could have any number of them: half a screen."""
-MOST_MODES = 30
-"""Modes in a table, the lowest, and resonances: a page."""
+ROWS, MOST_MODES = 12, 30
+"""Of a printed table that could have any number of them: half a screen; of one of modes or resonances: a page."""
 Show = Callable[[float, str], None]
 """Told how much is done, and a word or two on it."""
 FORMAT = "{desc}: {percentage:3.0f}%|{bar}| {n:.4g} of {total:.4g} {unit} [{elapsed}<{remaining}]"

@@ -16,9 +16,9 @@ from shaftwork.core.files import in_a_folder
 from shaftwork.drawing.items import Item, plain
 from shaftwork.drawing.layout import SHEET, Box, Placement, Spot
 from shaftwork.drawing.placement import placed
-from shaftwork.drawing.strokes import THICK, THIN, Stroke, Text, area, circle, line, moved, rectangle
+from shaftwork.drawing.strokes import THICK, THIN, WHITE, Stroke, Text, area, circle, line, moved, rectangle
 from shaftwork.drawing.svg import svg_of
-from shaftwork.drawing.symbols import EARTH, FRAME, LENGTH, WHITE
+from shaftwork.drawing.symbols import EARTH, FRAME, LENGTH
 from shaftwork.drawing.texts import FORMULA, box_of, letters_of, width_of
 from shaftwork.drawing.windings import DEPTH, Core
 from shaftwork.equations.spelling import in_text
@@ -28,12 +28,8 @@ from shaftwork.results.plotting import new_figure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MARGIN = 10.0
-"""Around a drawing, pt."""
 FORMATS = ("svg", "pdf", "png", "tex")
-RESOLUTION = 200
-"""Of a picture, pixels per inch."""
-LARGEST = {"png": 2**16 * 72 / RESOLUTION, "tex": 16383.0}
+LARGEST = {"png": 2**16 * 72 / SHEET.resolution, "tex": 16383.0}
 """The longest side, pt: pictures have 2^16 pixels, and TeX's lengths end at 2^14 pt."""
 
 
@@ -82,7 +78,7 @@ class Drawing:
                 left, bottom, right, top = box_of(text)
                 xs += [left, right]
                 ys += [bottom, top]
-        return min(xs) - MARGIN, min(ys) - MARGIN, max(xs) + MARGIN, max(ys) + MARGIN
+        return min(xs) - SHEET.margin, min(ys) - SHEET.margin, max(xs) + SHEET.margin, max(ys) + SHEET.margin
 
     def figure(self) -> Figure:
         """As a figure of matplotlib, in its own size.
@@ -144,7 +140,7 @@ class Drawing:
         title = "".join(sign for sign in self.name if sign.isprintable())
         metadata = {"Title": title, "CreationDate": None} if ending == "pdf" else {}
         with mpl.rc_context({"pdf.fonttype": 42}):
-            self.figure().savefig(stream, format=ending, dpi=RESOLUTION, metadata=metadata)
+            self.figure().savefig(stream, format=ending, dpi=SHEET.resolution, metadata=metadata)
         return stream.getvalue()
 
     @cached_property
@@ -221,7 +217,7 @@ def drawn(graph: CircuitGraph, items: Sequence[Item], *, train: bool, width: flo
     """
     if not (isinstance(width, int | float) and width > 0):
         raise ParameterError(f"width = {width!r} must be a number of points above 0, or math.inf for one row.")
-    result = placed(items, width_of, lambda node: plain(graph.node_name(node)), width - 2 * MARGIN)
+    result = placed(items, width_of, lambda node: plain(graph.node_name(node)), width - 2 * SHEET.margin)
     return Drawing(graph.name, tuple(_groups(result, graph, train=train)))
 
 

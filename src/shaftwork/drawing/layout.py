@@ -36,6 +36,8 @@ class Sheet(NamedTuple):
         beside: from a hanging symbol to its label.
         shallow, lines: how far a symbol on the line may reach down, and how many lines a label below it may have.
         arrow: of a mark, between its line and its name.
+        margin: around the drawing.
+        resolution: of a picture, pixels per inch.
     """
 
     space: float = 8.0
@@ -48,6 +50,8 @@ class Sheet(NamedTuple):
     shallow: float = 18.0
     lines: int = 2
     arrow: float = 8.0
+    margin: float = 10.0
+    resolution: int = 200
 
 
 SHEET = Sheet()

@@ -14,9 +14,6 @@ from shaftwork.drawing.symbols import LENGTH
 from shaftwork.drawing.windings import DEPTH
 from shaftwork.network.graph import GROUND
 
-FULL = 0.6
-"""The part of the width from which on a row may end, where fewer lines lead on than farther to the right."""
-
 
 def placed(
     items: Sequence[Item], width_of: Callable[[str], float], name_of: Callable[[End], str], width: float
@@ -44,7 +41,8 @@ def _row_from(first: int, layout: Layout) -> DrawnRow:
     for last in range(first, len(layout.order)):
         row = DrawnRow(layout, first, last)
         if rows and row.end > layout.width:
-            full = [each for each in rows if each.end > FULL * layout.width] or rows[-1:]
+            # From 0.6 of the width on a row may end, where fewer lines lead on than farther to the right.
+            full = [each for each in rows if each.end > 0.6 * layout.width] or rows[-1:]
             return min(reversed(full), key=attrgetter("leading_on"))
         rows.append(row)
     return rows[-1]

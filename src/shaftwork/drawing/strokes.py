@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 Point = tuple[float, float]
-THIN, THICK = 0.9, 2.2
-"""Width of lines and of shafts, pt."""
+THIN, THICK, GREY, WHITE = 0.9, 2.2, 0.85, 1.0
+"""Width of lines and of shafts, pt; what areas are filled with."""
 
 
 @dataclass(frozen=True)

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from shaftwork.drawing.strokes import Point, Stroke, arc, area, arrow, circle, line, rectangle
+from shaftwork.drawing.strokes import GREY, WHITE, Point, Stroke, arc, area, arrow, circle, line, rectangle
 
 LENGTH = 54.0
 """Of a symbol between its ends, pt."""
 MIDDLE = LENGTH / 2
-GREY, WHITE = 0.85, 1.0
 
 
 @dataclass(frozen=True)

@@ -55,8 +55,6 @@ class Setting:
 
 
 DIGITS = tuple("0123456789")
-SCALE = 100.0
-"""Formulas are set so much larger, as matplotlib rounds their heights to whole points."""
 
 
 @lru_cache(maxsize=16384)
@@ -76,14 +74,15 @@ def _set_by_matplotlib(words: str) -> Setting:
     from matplotlib.font_manager import FontProperties
     from matplotlib.mathtext import MathTextParser
 
-    font = FontProperties(family=FAMILY, size=SCALE * SIZE, math_fontfamily="dejavusans")
+    scale = 100.0  # so much larger they are set, as matplotlib rounds their heights to whole points
+    font = FontProperties(family=FAMILY, size=scale * SIZE, math_fontfamily="dejavusans")
     width, _, _, glyphs, bars = MathTextParser("path").parse(f"${words}$", 72, font)
     runs = []
     for face, size, sign, *_, x, y in glyphs:  # from matplotlib 3.11 on there is one more field
         slanted = "Oblique" in face.style_name or "Italic" in face.style_name
-        runs.append(Run(chr(sign), float(x) / SCALE, float(y) / SCALE, size / SCALE, 0.0, face.family_name, slanted))
-    corners = ((x / SCALE, y / SCALE, (x + length) / SCALE, (y + height) / SCALE) for x, y, length, height in bars)
-    return Setting(float(width) / SCALE, tuple(runs), tuple(rectangle(*each, fill=0.0) for each in corners))
+        runs.append(Run(chr(sign), float(x) / scale, float(y) / scale, size / scale, 0.0, face.family_name, slanted))
+    corners = ((x / scale, y / scale, (x + length) / scale, (y + height) / scale) for x, y, length, height in bars)
+    return Setting(float(width) / scale, tuple(runs), tuple(rectangle(*each, fill=0.0) for each in corners))
 
 
 @lru_cache(maxsize=16384)

@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from shaftwork.drawing.strokes import Stroke, circle, line, rectangle
-from shaftwork.drawing.symbols import EARTH, GREY, coil
+from shaftwork.drawing.strokes import GREY, Stroke, circle, line, rectangle
+from shaftwork.drawing.symbols import EARTH, coil
 from shaftwork.network.graph import GROUND
 
-RADIUS, TURNS = 4.0, 3
+RADIUS, TURNS, RETURN = 4.0, 3, 11.0
+"""Of a coil, with pt from it to the wire that comes back from its lower end."""
 TOP, FOOT = -10.0, -10.0 - 2 * RADIUS * TURNS
 EARTHED = FOOT - 10.0
 DEPTH = 8.0 - EARTHED
 """How far windings reach below the line."""
-RETURN = 11.0
-"""From a coil to the wire that comes back from its lower end."""
 
 
 @dataclass(frozen=True)

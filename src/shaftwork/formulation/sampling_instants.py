@@ -7,11 +7,7 @@ import math
 from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError
 from shaftwork.formulation.form import StateForm
 from shaftwork.network.netlist import title
-
-EARLY = 4
-"""So many units in the last place an instant is earlier than k T: rounding moves k T / T and the like by less."""
-MOST = 500_000
-"""Samples of a run: each ends a step, at 0.1 ms and more."""
+from shaftwork.numerics.zeros import just_before
 
 
 def sampling_instants(form: StateForm, t0: float, t_end: float) -> tuple[float, ...]:
@@ -29,14 +25,14 @@ def sampling_instants(form: StateForm, t0: float, t_end: float) -> tuple[float, 
     for part in form.graph.parts:
         if (sampler := part.component.sampler()) is not None:
             first, last = math.ceil(t0 / sampler.period), math.floor(t_end / sampler.period)
-            if last - first > MOST:
+            if last - first > 500_000:  # each ends a step, at 0.1 ms and more
                 raise ParameterError(
                     f"'{part.name}' would sample {last - first + 1} times between t = {t0:g} s and {t_end:g} s. Take a "
                     "shorter run, or a longer sample_time."
                 )
             instants += [k * sampler.period for k in range(first, last + 1)]
     # An output time that is an instant but for rounding shall show what is held from there on.
-    return tuple(time - EARLY * math.ulp(time) for time in instants)
+    return tuple(map(just_before, instants))
 
 
 def refuse_sampled(form: StateForm, what: str, kind: type[ShaftworkError] = SimulationError) -> None:

@@ -29,10 +29,11 @@ from shaftwork.formulation.value_diagnosis import speeds_along
 from shaftwork.frequency import campbell as diagram
 from shaftwork.frequency.linear_model import ExactModel, LinearModel, linear_model
 from shaftwork.frequency.linearization import Linearization
-from shaftwork.frequency.natural_modes import MOVES, NaturalModes
+from shaftwork.frequency.natural_modes import NaturalModes
 from shaftwork.network.graph import GROUND, CircuitGraph, Reading, readings_of
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import listed
+from shaftwork.numerics.tolerances import TYPED
 from shaftwork.pipeline.arguments import Names, Point, Time, as_names
 from shaftwork.pipeline.prepared import OperatingPoint
 from shaftwork.pipeline.settled import SteadyState
@@ -117,7 +118,7 @@ def as_multiple(ratio: float | None) -> str:
     sign, size = "-" * (ratio < 0), abs(ratio)
     if size == 0:
         return "0"
-    if abs(size - 1) < MOVES:
+    if abs(size - 1) < TYPED:
         return f"{sign}n"
     return f"{sign}n/{1 / size:.10g}" if size < 1 else f"{sign}{size:.10g}*n"
 
@@ -162,7 +163,7 @@ def warn_of_turning_angles(bound: BoundArrays, t: float, x: Array) -> None:
     """
     form, first = bound.program.form, len(x) - len(bound.program.form.integrals)
     rates = np.abs(bound.rhs(t, x)[first:])
-    turns = rates > MOVES * np.append(rates, np.abs(x[: len(form.across_states)])).max(initial=0.0)
+    turns = rates > TYPED * np.append(rates, np.abs(x[: len(form.across_states)])).max(initial=0.0)
     angles = zip(form.integrals, form.states[first:], x[first:], strict=True)
     for branch, state, value in compress(angles, turns):
         if readers := _readers(form, branch):

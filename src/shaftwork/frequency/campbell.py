@@ -13,7 +13,7 @@ import numpy as np
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si
 from shaftwork.core.screen import counted, in_lines
-from shaftwork.frequency.modes_over_speed import BEYOND, Meeting, OverSpeed, Swinging, differing, numbered
+from shaftwork.frequency.modes_over_speed import Meeting, OverSpeed, Swinging, differing, numbered
 from shaftwork.frequency.natural_modes import NaturalModes
 from shaftwork.results.observer import RPM, Array, array_in_si
 from shaftwork.results.plotting import new_figure
@@ -119,7 +119,7 @@ def campbell(
     """
     n, lines = _ascending(speeds), _orders(orders)
     top = float(max(lines) * n[-1] / (2 * np.pi)) if f_max is None else in_si("f_max", f_max, "Hz", above=0)
-    network = OverSpeed(lambda speed: modes_at(speed, BEYOND * top), top)
+    network = OverSpeed(modes_at, top)
     points = [network.at(float(n[0]))] * len(n) if constant else [network.at(float(speed)) for speed in n]
     meetings = _constant(points[0], n, lines) if constant else network.meetings(n, lines)
     names = _names(network, [*points, *(met.at for met in meetings)])

@@ -18,12 +18,11 @@ from scipy.sparse.linalg import ArpackError, LinearOperator, eigs, splu
 
 from shaftwork.core.errors import ParameterError, SimulationError
 from shaftwork.core.notices import hint
+from shaftwork.numerics.tolerances import EPS
 from shaftwork.results.observer import Array, Complex
 
 LARGEST_DENSE = 1500
 """States up to which all eigenvalues are computed."""
-ROUNDINGS = 8
-"""Rounding errors within which two entries are the same."""
 ZERO = 1e-10
 """A rate below this fraction of the shift is zero: shift and invert gives no more digits."""
 
@@ -71,9 +70,9 @@ def _connected(matrix: Any, count: int | None) -> tuple[Complex, Complex]:
 
 
 def _is_skew(matrix: Any) -> bool:
-    """Whether an entry and its mirror image cancel to rounding, everywhere: nothing is lost or supplied."""
+    """Whether an entry and its mirror image cancel to eight roundings, everywhere: nothing is lost or supplied."""
     sums, sizes = abs(matrix + matrix.T), abs(matrix) + abs(matrix.T)
-    return not (sums - ROUNDINGS * np.finfo(float).eps * sizes > 0).nnz
+    return not (sums - 8 * EPS * sizes > 0).nnz
 
 
 def _all(matrix: Array, *, lossless: bool) -> tuple[Complex, Complex]:
@@ -112,7 +111,7 @@ def _separated(vectors: Array) -> Array:
         return vectors
     _, _, order = qr(vectors.T, mode="economic", pivoting=True)
     basis = vectors @ np.linalg.inv(vectors[np.sort(order[: vectors.shape[1]])])
-    basis[np.abs(basis) < len(vectors) * ROUNDINGS * np.finfo(float).eps * np.abs(basis).max()] = 0.0
+    basis[np.abs(basis) < len(vectors) * 8 * EPS * np.abs(basis).max()] = 0.0
     return np.asarray(basis)
 
 

@@ -44,8 +44,6 @@ if TYPE_CHECKING:
 Compile = Callable[[Netlist], Model]
 OWN = Spectral(16)
 """The mesh in place of a wave where quantities are named and operating points are read."""
-MESHES = 4
-"""Meshes that are kept for later points."""
 
 
 def small_motions(model: Model, compiled: Compile, *, every: bool) -> SmallMotions:
@@ -86,7 +84,7 @@ class ExactNetwork:
 
     def __init__(self, model: Model, compiled: Compile, shafts: Mapping[str, Shaft]) -> None:
         self._model, self._compiled, self._shafts = model, compiled, shafts
-        self._meshes = BoundedCache[tuple[int, ...], Model](MESHES)
+        self._meshes = BoundedCache[tuple[int, ...], Model]()
 
     @cached_property
     def _own(self) -> Model:
@@ -218,7 +216,7 @@ class ExactPhases:
 
     def __init__(self, model: HybridModel, compiled: Compile, shafts: Mapping[str, Shaft]) -> None:
         self._model, self._compiled, self._shafts = model, compiled, shafts
-        self._networks = BoundedCache[tuple[str, ...], ExactNetwork](MESHES)
+        self._networks = BoundedCache[tuple[str, ...], ExactNetwork]()
 
     @cached_property
     def _own(self) -> HybridModel:

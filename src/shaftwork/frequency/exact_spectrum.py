@@ -18,13 +18,13 @@ from shaftwork.core.notices import warn
 from shaftwork.frequency.exact_lines import ExactSlopes
 from shaftwork.frequency.frequency_response import solved_densely
 from shaftwork.frequency.natural_modes import (
-    EQUAL,
     NaturalModes,
     checked_count,
     largest_rate,
     modes_of,
     states_that_act,
 )
+from shaftwork.numerics.tolerances import EQUAL
 from shaftwork.results.observer import Array, Complex, blocks
 
 MODES = 10

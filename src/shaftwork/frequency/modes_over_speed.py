@@ -9,16 +9,15 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import brentq, linear_sum_assignment
 
-from shaftwork.frequency.natural_modes import EQUAL, NaturalModes, natural_frequencies
+from shaftwork.frequency.natural_modes import NaturalModes, natural_frequencies
+from shaftwork.numerics.tolerances import EQUAL
 from shaftwork.results.observer import Array, Complex
 
-BEYOND = 1.2
-"""Modes are followed up to so many times the end of a diagram, so that none is lost at its edge."""
 BETWEEN = ", "
 """Between the modes of the parts in the words of a phase."""
 
-ModesAt = Callable[[float], tuple[NaturalModes, str]]
-"""From a speed in rad/s to the modes there and the phase that they belong to."""
+ModesAt = Callable[[float, float], tuple[NaturalModes, str]]
+"""From a speed in rad/s and a frequency in Hz to the modes there, up to it at least, and the phase they belong to."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +96,7 @@ class OverSpeed:
     """The modes of a network over the speed of a shaft, computed where they are asked for and kept.
 
     Args:
-        modes_at: from a speed to the modes there.
+        modes_at: the modes at a speed.
         f_max: highest frequency of interest, Hz.
     """
 
@@ -108,7 +107,8 @@ class OverSpeed:
     def at(self, speed: float) -> Swinging:
         """The modes at a speed in rad/s."""
         if speed not in self.points:
-            self.points[speed] = swinging(speed, *self.modes_at(speed), BEYOND * self.f_max)
+            limit = 1.2 * self.f_max  # so far beyond the end of a diagram that none is lost at its edge
+            self.points[speed] = swinging(speed, *self.modes_at(speed, limit), limit)
         return self.points[speed]
 
     def meetings(self, speeds: Array, orders: Sequence[float]) -> list[Meeting]:

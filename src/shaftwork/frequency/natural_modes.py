@@ -19,6 +19,7 @@ from shaftwork.core.storing import StoredByFields
 from shaftwork.frequency.eigenvalues import eigenmodes
 from shaftwork.frequency.exact_lines import Motions
 from shaftwork.frequency.linearization import Linearization
+from shaftwork.numerics.tolerances import EQUAL, TYPED
 from shaftwork.results.observer import Array, Complex
 from shaftwork.results.plotting import new_figure
 
@@ -26,12 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from shaftwork.animation.animation import Animation
-
-EQUAL = 1e-6
-"""Amplitudes, rates and frequencies that differ by less than this fraction are equal: of several largest amplitudes the
-first is the reference of the shape."""
-MOVES = 1e-9
-"""A node moves when its amplitude, or speed, is more than this fraction of the largest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,7 +255,7 @@ def _scaled(slopes: Motions, rates: Complex, vectors: Complex) -> Complex:
     for k in range(vectors.shape[1]):
         unit = max(by_unit, key=lambda name: by_unit[name][k], default="")
         column = vectors[:, k] * slopes.weights
-        if unit and by_unit[unit][k] > MOVES**2 * energy[:, k].sum():
+        if unit and by_unit[unit][k] > TYPED**2 * energy[:, k].sum():
             column = amplitudes[unit][:, k]
         size = np.abs(column)
         scaled[:, k] /= column[np.flatnonzero(size >= (1 - EQUAL) * size.max())[0]]
@@ -288,9 +283,9 @@ def _standing(slopes: Motions, vectors: Complex) -> Iterator[str]:
     read = _free(slopes, np.zeros(vectors.shape[1], dtype=complex), vectors)
     speeds = np.array([np.abs(read(node)) for _, node in slopes.masses]).reshape(-1, vectors.shape[1])
     for speed, vector in zip(speeds.T, vectors.T, strict=True):
-        moving = [slopes.masses[k][0] for k in np.flatnonzero(speed > MOVES)]
+        moving = [slopes.masses[k][0] for k in np.flatnonzero(speed > TYPED)]
         size = np.abs(vector * slopes.weights)
-        holding = [slopes.states[k].rpartition(".")[0] for k in np.flatnonzero(size > MOVES * size.max())]
+        holding = [slopes.states[k].rpartition(".")[0] for k in np.flatnonzero(size > TYPED * size.max())]
         owners = list(dict.fromkeys(moving or holding))
         listed = ", ".join(owners if len(owners) <= 4 else [*owners[:2], "...", owners[-1]])
         yield f"rigid body of {listed}" if moving else f"constant in {listed}"
@@ -314,7 +309,7 @@ def _plot(modes: NaturalModes, numbers: tuple[int, ...]) -> Figure:
             places = [place for its, place in nodes.values() if its == unit]
             shape = np.array([modes.shapes[name][number] for name, (its, _) in nodes.items() if its == unit])
             (line,) = axis.plot(places, shape.real, marker="o", markersize=3, linewidth=1.2, label=unit)
-            if np.abs(shape.imag).max() > MOVES**0.5:
+            if np.abs(shape.imag).max() > TYPED**0.5:
                 later = f"{unit}, a quarter period before"
                 axis.plot(places, shape.imag, "--", linewidth=1.0, color=line.get_color(), alpha=0.5, label=later)
         frequency, damping = modes.frequencies[number], modes.damping[number]

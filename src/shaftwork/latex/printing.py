@@ -16,12 +16,9 @@ from shaftwork.equations.assembly import FactoredTerms, Sides, rising_first
 from shaftwork.equations.quantities import rate_of
 from shaftwork.equations.spelling import without_marks
 
-LINE_WIDTH = 76
-"""Characters of ordinary width that fit on a printed line beside its left side."""
-WIDEST_PIECE = 60
-"""A product with a sum that is wider may be broken inside the sum: some room is left for left sides."""
-WIDEST_CASE = 36
-"""A sum that is wider is broken within the row of its case: there are the left side and the condition beside it."""
+LINE_WIDTH, WIDEST_PIECE, WIDEST_CASE = 76, 60, 36
+"""Characters of ordinary width that fit beside a left side: on a printed line; of a product with a sum, which is broken
+inside it where it is wider; and of a sum in a row of cases, where the condition stands besides."""
 DIGITS = 6
 """Significant digits of numbers in equations."""
 TOKEN = re.compile(r"\\[A-Za-z]+|\\.|.", re.DOTALL)

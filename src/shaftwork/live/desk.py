@@ -10,14 +10,17 @@ if TYPE_CHECKING:
     from starlette.requests import Request
     from starlette.websockets import WebSocket
 
-PATIENCE = 0.5
-"""How long the work on a request goes on once a newer one waits, s: while a slider moves, quick answers still come."""
-
 
 class Desk:
-    """Takes what comes from a page, and keeps the newest."""
+    """Takes what comes from a page, and keeps the newest.
 
-    def __init__(self) -> None:
+    Args:
+        patience: how long the work on a request goes on once a newer one waits, s: while a slider moves, quick answers
+            still come.
+    """
+
+    def __init__(self, patience: float = 0.5) -> None:
+        self._patience = patience
         self._text: str | None = None
         self._coming = asyncio.Event()
         self._start = 0.0
@@ -44,4 +47,4 @@ class Desk:
 
     def waits(self) -> bool:
         """Whether the page still waits for the answer to the request that was taken."""
-        return not self._left and (self._text is None or time.monotonic() - self._start < PATIENCE)
+        return not self._left and (self._text is None or time.monotonic() - self._start < self._patience)

@@ -22,8 +22,6 @@ WEB = Path(__file__).parent / "web"
 SCRIPTS = ("stage.js", "plot.js", "page.js")
 COUNTS = {1: (21,), 2: (11, 11)}
 """Values along each slider of a page without a server, when nobody chooses."""
-MOST_ANSWERS = 400
-"""Answers in one page: each takes some 100 kB."""
 
 
 def plotly_script() -> str:
@@ -72,8 +70,8 @@ def _grid(axes: Sequence[Slider], counts: Sequence[int]) -> list[list[float]]:
         raise ParameterError(f"counts = {counts!r} must be a whole number from 2 on for each slider, such as (11, 11).")
     grid = [axis.values(count) for axis, count in zip(axes, counts, strict=True)]
     total = len(grid[0]) * (len(grid[1]) if len(grid) > 1 else 1)
-    if total > MOST_ANSWERS:
-        raise ParameterError(f"counts = {tuple(counts)} are {total} answers; a page has at most {MOST_ANSWERS}.")
+    if total > (most := 400):  # each takes some 100 kB
+        raise ParameterError(f"counts = {tuple(counts)} are {total} answers; a page has at most {most}.")
     return grid
 
 

@@ -36,11 +36,8 @@ if TYPE_CHECKING:
 FILES = {"model.toml": "application/toml", "report.pdf": "application/pdf", "report.html": "text/html; charset=utf-8"}
 """What can be saved from the page, with its kind."""
 KINDS = {".css": "text/css; charset=utf-8", ".js": "text/javascript; charset=utf-8"}
-MOST_PORTS = 65_535
 MOST_BYTES = 1_000_000
 """Of a request."""
-ROUND = 0.5
-"""Between two looks at whether a session was closed, s."""
 EXTRA, PURPOSE = "live", "A live page"
 
 
@@ -74,7 +71,7 @@ def serve(
         say(f"{session.title}: {address}\nCtrl-C ends it.")
         if browser:
             webbrowser.open(address)
-        while not session.closing.wait(ROUND):  # in rounds, which Ctrl-C ends on every system
+        while not session.closing.wait(0.5):  # in rounds of 0.5 s, which Ctrl-C ends on every system
             pass
 
 
@@ -93,8 +90,8 @@ def serving(session: Session, *, port: int = 0) -> Iterator[str]:
         MissingExtraError: starlette, uvicorn, websockets or plotly is not installed (extra `live`).
     """
     uvicorn = [imported(name, EXTRA, PURPOSE) for name in ("websockets", "uvicorn")][-1]
-    if whole(port, 0, MOST_PORTS) is None:
-        raise ParameterError(f"port = {port!r} must be a whole number up to {MOST_PORTS}; 0 takes a free one.")
+    if whole(port, 0, last := 2**16 - 1) is None:
+        raise ParameterError(f"port = {port!r} must be a whole number up to {last}; 0 takes a free one.")
     try:
         listening = socket.create_server((HOST, port))
     except OSError as error:

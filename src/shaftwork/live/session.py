@@ -25,7 +25,7 @@ from shaftwork.live.page_requests import checked, objections
 from shaftwork.live.sliders import Slider, StartField, sliders_of, start_fields_of
 from shaftwork.live.stage import described, moved
 from shaftwork.live.work import ADVICE, LIMITS, MOST_STEPS, WatchedSolution, Work
-from shaftwork.pipeline.arguments import checked_parameters
+from shaftwork.pipeline.arguments import FALLBACK_END, checked_parameters
 from shaftwork.pipeline.network import Network, network_of, with_values
 from shaftwork.results.observer import ANGLES, Array
 from shaftwork.results.plotting import MOST_SIGNALS, grouped
@@ -34,10 +34,6 @@ from shaftwork.scenes.catalog import Scene
 
 POINTS = 600
 """Output times of a motion: as many as a plot on a screen has room for."""
-END = 10.0
-"""End of the motion of a network without a scene, s."""
-SHORTEST, LONGEST = 4.0, 12.0
-"""How long a motion is played, s: as long as it lasts, within these bounds."""
 
 
 class Session:
@@ -72,7 +68,7 @@ class Session:
         self.network = scene() if scene else network_of(subject)
         self.scene = scene
         """What it is, where it is one."""
-        self.t_end = t_end if t_end is not None else scene.t_end if scene else END
+        self.t_end = t_end if t_end is not None else scene.t_end if scene else FALLBACK_END
         self.initial = dict(initial or {})
         """Start values where a request gives none."""
         self.closing = threading.Event()
@@ -259,7 +255,7 @@ class Session:
         """The angles of the train as it is played; None where there is nothing to play."""
         if not self._train.nodes:
             return None
-        lasting = min(LONGEST, max(SHORTEST, float(motion.t[-1] - motion.t[0])))
+        lasting = min(12.0, max(4.0, float(motion.t[-1] - motion.t[0])))  # s, that eyes follow
         turning = self._train.turning(motion.t, motion.__getitem__, lasting)
         return {
             "seconds": lasting,

@@ -17,8 +17,6 @@ from shaftwork.equations.spelling import GREEK
 from shaftwork.pipeline.model import Model
 from shaftwork.results.observer import Observer
 
-SPAN = 4.0
-"""A slider goes from the value divided by this factor to the value times it."""
 TWISTS = {"tau_c": "phi_rel", "f_c": "s_rel"}
 """By the elastic torque or force of a spring, which is its state, the twist or stretch that people think in."""
 _GREEK = re.compile(rf"\\?(?:var)?({'|'.join(GREEK)})(?![A-Za-z])")
@@ -59,18 +57,18 @@ class Slider:
         return [float(value) for value in np.unique(np.rint(exact) if self.whole else exact)]
 
 
-def sliders_of(model: Model) -> Mapping[str, Slider]:
-    """A slider for every parameter of a model, by name, in the order of the network."""
+def sliders_of(model: Model, span: float = 4.0) -> Mapping[str, Slider]:
+    """A slider for every parameter of a model, by name, from its value divided by `span` to its value times that."""
     declared = {
         f"{item.part.name}.{key}": one for item in model.netlist.placed for key, one in item.part.declared.items()
     }
-    return {name: _slider(name, declared[name], value) for name, value in model.parameters.items()}
+    return {name: _slider(name, declared[name], value, span) for name, value in model.parameters.items()}
 
 
-def _slider(name: str, declared: Parameter, value: float) -> Slider:
-    low, high = sorted((value / SPAN, value * SPAN))
+def _slider(name: str, declared: Parameter, value: float, span: float) -> Slider:
+    low, high = sorted((value / span, value * span))
     if declared.at_least is not None:
-        low = max(low, declared.at_least or value / SPAN)  # zero is at no end of equal ratios
+        low = max(low, declared.at_least or value / span)  # zero is at no end of equal ratios
     if declared.above is not None and low <= declared.above:
         low = (declared.above + value) / 2
     if declared.at_most is not None:

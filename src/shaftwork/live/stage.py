@@ -8,15 +8,13 @@ from typing import Any
 
 from shaftwork.animation.turning import Train
 
-MOST_NODES = 60
-"""Nodes up to which a network is moved; more would be dots on a screen."""
 INERTIAS = ("J", "m")
 """Parameters by which a disc is the larger."""
 
 
 def moved(train: Train) -> Train:
     """The train that a page moves; empty where it has too many nodes."""
-    return train if len(train.nodes) <= MOST_NODES else Train((), ())
+    return train if len(train.nodes) <= 60 else Train((), ())  # more would be dots on a screen
 
 
 def described(train: Train, parameters: Collection[str]) -> Mapping[str, Any]:

@@ -11,10 +11,9 @@ from shaftwork.core.errors import SimulationError
 from shaftwork.results.observer import Array, Read, Reader
 from shaftwork.results.solution import Solution
 
-LONGEST = 120.0
-"""Of the work on an answer, s; compiling a train of many parts takes a part of the first."""
-MOST_STEPS = 100_000
-"""Of a motion: its continuous output takes some 10 kB a step where there are many states."""
+LONGEST, MOST_STEPS = 120.0, 100_000
+"""Of the work on an answer, s: compiling a train of many parts takes a part of the first. And of a motion, whose
+continuous output takes some 10 kB a step where there are many states."""
 LIMITS = f"{MOST_STEPS} steps and {LONGEST:g} s are the most that an answer of a page takes"
 ADVICE = "Let the motion end earlier on the page, or compute it with simulate."
 

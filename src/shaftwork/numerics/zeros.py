@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.numerics.polynomials import Array
-from shaftwork.numerics.tolerances import EPS
+from shaftwork.numerics.tolerances import EPS, ROUNDINGS
 
 LOOKS = np.array([0.004, 0.07, 0.19, 0.31, 0.42, 0.53, 0.61, 0.74, 0.83, 0.91, 0.996])
 """Shares of a step at which its inside is looked at: at no regular places, which a motion might share. The outermost
@@ -77,10 +77,6 @@ def zeros(
         if not moves.any():
             break
     return place
-
-
-# A jump that is written as Heaviside(3 t - 1) is met some rounding units beside the time that is computed for it.
-ROUNDINGS = 4
 
 
 def just_before(time: float) -> float:

@@ -23,8 +23,8 @@ from shaftwork.results.solution import Solution
 
 FINEST_RTOL = float(np.finfo(float).eps)
 """What doubles can keep; a smaller tolerance would promise what no engine holds."""
-OUTPUTS = 1001
-"""Output times where the user gives none."""
+OUTPUTS, FALLBACK_END = 1001, 10.0
+"""Output times, and in s the end of a motion in the command and on live pages, where neither user nor scene says."""
 NOMINAL = 1e-3
 """Absolute tolerance as a fraction of the relative one, for a speed of 1 rad/s (m/s, V)."""
 STAND_IN = 1.0

@@ -60,9 +60,6 @@ if TYPE_CHECKING:
     from shaftwork.frequency.linear_model import LinearModel
     from shaftwork.stepper.simulation import Simulation
 
-VARIANTS = 8
-"""Models of other structure, and choices of an engine, that are kept for later calls."""
-
 
 class Model(ExportedModel):
     """A network as a fast function of time, states and parameters, ready to be simulated again and again.
@@ -87,7 +84,7 @@ class Model(ExportedModel):
         super().__init__(form)
         self.netlist, self._rebuild, self._resting = netlist, rebuild, resting
         self._prepared = BoundedCache[bytes, Prepared](1)
-        self._variants = BoundedCache[tuple[tuple[str, float], ...], Model](VARIANTS)
+        self._variants = BoundedCache[tuple[tuple[str, float], ...], Model]()
         self._choices: list[tuple[tuple[float, float, float], Array, tuple[str, str]]] = []
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -355,7 +352,7 @@ class Model(ExportedModel):
             if run == key and ((p / 5.0 < prepared.p) == (prepared.p < p * 5.0)).all():
                 return chosen
         chosen = choice.choose(problem)
-        self._choices = [*self._choices[1 - VARIANTS :], (key, prepared.p, chosen)]
+        self._choices = [*self._choices[-7:], (key, prepared.p, chosen)]  # the last eight, for later calls
         return chosen
 
     def changes_structure(self, values: Mapping[str, float]) -> bool:

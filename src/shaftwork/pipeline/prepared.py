@@ -32,8 +32,6 @@ from shaftwork.results.solution import Solution
 
 HIDDEN = 10.0
 """A state is hidden where its absolute tolerance is more than this many times its relative one at its largest."""
-ROUNDING = 1e-14
-"""Part of the size of all states together by which a step moves each of them at random."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -300,7 +298,8 @@ def _hidden(motion: Solution, form: StateForm, demand: Demand, tolerances: Array
     ordinary = tolerances / NOMINAL
     speed = (reached / ordinary)[~is_angle].max(initial=0.0) or (reached / ordinary).max(initial=0.0)
     step = (demand.span[1] - demand.span[0]) / max(1, motion.statistics.get("steps", 1))
-    floor = ROUNDING / rtol * speed * ordinary * np.where(is_angle, min(1.0, step), 1.0)
+    # Rounding in a step moves each state at random, by 1e-14 of the size of all states together.
+    floor = 1e-14 / rtol * speed * ordinary * np.where(is_angle, min(1.0, step), 1.0)
     if not ((reached > floor) & (NOMINAL * usual > HIDDEN * reached)).any():
         return None
     sizes = np.minimum(np.maximum(reached, floor), usual).tolist()

@@ -23,15 +23,14 @@ from shaftwork.core.notices import hint, warn
 from shaftwork.formulation.sampling_instants import refuse_sampled
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import first_few
+from shaftwork.numerics.tolerances import EQUAL
 from shaftwork.pipeline.prepared import Prepared
 
 if TYPE_CHECKING:
     from shaftwork.network.graph import CircuitGraph, GraphBranch
     from shaftwork.pipeline.model import Model
 
-SAME = 1e-6
-"""Levels of a law that differ by less than this fraction are one."""
-MIDDLE = (1.0, 1.0 + SAME, 1.0)
+MIDDLE = (1.0, 1.0 + EQUAL, 1.0)
 """Of a level that lasts its middle is named."""
 
 
@@ -147,7 +146,7 @@ def _levels(bound: BoundArrays, x: Array, times: Array, since: Mapping[str, floa
         valid = times[:, 0] >= since.get(graph.part_of(branch).name, 0.0)
         final, courses = history[-1, 1], np.where(valid[:, None], history, np.nan)
         size = np.nanmax(np.abs(courses), initial=0.0)
-        close = SAME * size
+        close = EQUAL * size
         lasting = np.ptp(courses, axis=1, keepdims=True) <= close
         other = (np.abs(courses) > abs(final) + close) | (courses * final < -(close**2))
         other |= lasting & (np.abs(courses) > close) & (np.abs(courses - final) > close)

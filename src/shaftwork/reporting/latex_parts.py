@@ -4,15 +4,45 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 from shaftwork.equations.spelling import in_text
 from shaftwork.latex.nomenclature import column, table
 from shaftwork.latex.printing import printed_number
 
-WIDTH = 162.0
-"""Of a table, mm."""
-SPACE = 4.2
-"""Between two columns, mm."""
+
+class ReportPage(NamedTuple):
+    """What a page of a report has room for, and how much of each kind is shown where nobody chooses.
+
+    Args:
+        width, gap: of a table and between two of its columns, mm.
+        letters: of a line of the model file.
+        parts: up to which a drawing can be read.
+        curves: in a picture, which is then no higher than a page.
+        axis: height of an axis that can be zoomed, pixels.
+        marks: changes of mode up to which each is a line across the curves.
+        states: whose start and end are listed.
+        phases: listed of the beginning, and as many of the end, of a motion that has more.
+        printed_phases: whose equations are printed, the longest.
+        cycles: quantities whose load cycles are counted.
+        holzer: modes in tables of their own, the lowest.
+    """
+
+    width: float = 162.0
+    gap: float = 4.2
+    letters: int = 96
+    parts: int = 60
+    curves: int = 4
+    axis: int = 220
+    marks: int = 60
+    states: int = 40
+    phases: int = 20
+    printed_phases: int = 6
+    cycles: int = 6
+    holzer: int = 3
+
+
+PAGE = ReportPage()
 
 
 def number(value: float, digits: int = 5) -> str:
@@ -30,7 +60,7 @@ def columns(headings: Sequence[str], rows: Iterable[Sequence[str]], shares: Sequ
         rows: cells in LaTeX.
         shares: widths of the columns, of which only the ratios count.
     """
-    room = WIDTH - SPACE * (len(shares) - 1)
+    room = PAGE.width - PAGE.gap * (len(shares) - 1)
     widths = [int(room * share / sum(shares)) for share in shares]
     body = table("".join(map(column, widths)), tuple(headings), [tuple(cells) for cells in rows])
     return f"\\begingroup\\small\n{body}\n\\endgroup" if body else ""

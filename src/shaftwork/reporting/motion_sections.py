@@ -11,7 +11,7 @@ from shaftwork.core.errors import MissingExtraError, ShaftworkError
 from shaftwork.core.screen import counted
 from shaftwork.equations.spelling import in_text
 from shaftwork.latex.nomenclature import breakable, unit
-from shaftwork.reporting.latex_parts import columns, listed, number, paragraphs, picture
+from shaftwork.reporting.latex_parts import PAGE, columns, listed, number, paragraphs, picture
 from shaftwork.reporting.subject import ReportSection, Subject
 from shaftwork.results.fatigue import SNLine, twisted
 
@@ -19,15 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from shaftwork.results.solution import Solution
-
-CURVES = 4
-"""Quantities in a picture, which is then no higher than a page."""
-ROWS = 20
-"""Phases listed of the beginning, and as many of the end, of a motion that has more."""
-MOST_STATES = 40
-"""Quantities whose start and end are listed."""
-MOST_CYCLES = 6
-"""Quantities whose load cycles are counted."""
 
 
 def conditions(subject: Subject) -> ReportSection:
@@ -37,7 +28,7 @@ def conditions(subject: Subject) -> ReportSection:
         return ReportSection()
     start, end = solution.steps[0], solution.steps[-1]
     names = [name for name in dict.fromkeys((*solution.initial, *solution.states)) if name in solution]
-    courses = [(name, solution[name]) for name in names[:MOST_STATES]]
+    courses = [(name, solution[name]) for name in names[: PAGE.states]]
     rows = [
         (breakable(name), number(course[0]), number(course[-1]), unit(solution.reader.unit(name)))
         for name, course in courses
@@ -46,8 +37,8 @@ def conditions(subject: Subject) -> ReportSection:
     begins = "with the values below" if any(course[0].any() for _, course in courses) else "at rest"
     modes = f", in the modes: {solution.phases[0].name}" if solution.phases else ""
     said = [f"The motion starts {begins}{modes}.", f"It is computed from {start:g} s to {end:g} s."]
-    if len(names) > MOST_STATES:
-        said.append(f"The first {MOST_STATES} of {len(names)} quantities that say where it starts are listed.")
+    if len(names) > PAGE.states:
+        said.append(f"The first {PAGE.states} of {len(names)} quantities that say where it starts are listed.")
     said.append("What drives and loads it over time stands among the values and laws of the parts.")
     heads = ("Quantity", "At the start", "At the end", "Unit")
     return ReportSection(paragraphs(in_text(" ".join(said)), columns(heads, rows, (4, 2, 2, 2))))
@@ -61,7 +52,7 @@ def motion(subject: Subject) -> ReportSection:
     pictures: list[str] = []
     figures: dict[str, Figure] = {}
     curves: dict[str, tuple[str, ...]] = {}
-    count = -(-len(subject.signals) // CURVES)
+    count = -(-len(subject.signals) // PAGE.curves)
     for place in range(count):
         names = tuple(
             subject.signals[k] for k in range(len(subject.signals)) if k * count // len(subject.signals) == place
@@ -76,10 +67,11 @@ def _phases(solution: Solution) -> str:
     rows = solution.phases
     if not rows:
         return ""
-    shown = rows if len(rows) <= 2 * ROWS else (*rows[:ROWS], *rows[-ROWS:])
+    most = PAGE.phases
+    shown = rows if len(rows) <= 2 * most else (*rows[:most], *rows[-most:])
     cells = [(number(row.start), number(row.end), in_text(row.name)) for row in shown]
-    if len(rows) > 2 * ROWS:
-        cells.insert(ROWS, (r"\ldots", r"\ldots", in_text(f"{len(rows) - 2 * ROWS} more")))
+    if len(rows) > 2 * most:
+        cells.insert(most, (r"\ldots", r"\ldots", in_text(f"{len(rows) - 2 * most} more")))
     events = f"The motion has {counted(len(rows), 'phase')} and {counted(len(solution.events), 'event')}."
     return paragraphs(in_text(events), columns(("From s", "To s", "Phase"), cells, (1, 1, 6)))
 
@@ -124,7 +116,7 @@ def cycles(subject: Subject) -> ReportSection:
     if solution is None or not there:
         return ReportSection()
     ranges = {name: solution.max(name) - solution.min(name) for name in there}
-    names = sorted(there, key=lambda name: -ranges[name])[:MOST_CYCLES]
+    names = sorted(there, key=lambda name: -ranges[name])[: PAGE.cycles]
     try:
         counts = {name: solution.rainflow(name, place=_worst_place(solution, name)) for name in names}
     except MissingExtraError as missing:

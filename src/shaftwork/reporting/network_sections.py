@@ -14,7 +14,7 @@ from shaftwork.latex.document import section as printed_section
 from shaftwork.latex.nomenclature import breakable, condensed, laws, parameters, variables
 from shaftwork.modelfiles.storage import netlist_text
 from shaftwork.network.netlist import REFERENCE
-from shaftwork.reporting.latex_parts import columns, listed, number, paragraphs, picture
+from shaftwork.reporting.latex_parts import PAGE, columns, listed, number, paragraphs, picture
 from shaftwork.reporting.subject import ReportSection, Subject
 
 if TYPE_CHECKING:
@@ -23,17 +23,12 @@ if TYPE_CHECKING:
     from shaftwork.latex.blocks import Block
     from shaftwork.pipeline.network import Network
 
-COLUMNS = 96
-"""Letters of a line of the model file, which a page has room for."""
-MOST_DRAWN = 60
-"""Parts up to which a drawing can be read on a page."""
-
 
 def drawing(subject: Subject) -> ReportSection:
     """The drive train, its analogue circuit and, where there is one that can be read, the dual circuit."""
-    if len(subject.network.parts) > MOST_DRAWN:
+    if len(subject.network.parts) > PAGE.parts:
         return ReportSection(
-            notes=(f"Drawings of more than {MOST_DRAWN} parts cannot be read on a page and are left out.",)
+            notes=(f"Drawings of more than {PAGE.parts} parts cannot be read on a page and are left out.",)
         )
     figures = {"train": _on_a_page(subject.network), "circuit": _on_a_page(subject.network, as_circuit=True)}
     analogy = (
@@ -48,7 +43,7 @@ def drawing(subject: Subject) -> ReportSection:
     except NetworkError as reason:
         why = str(reason.problems[0]) if reason.problems else str(reason)
         return ReportSection(text, figures, notes=(f"The dual circuit is left out, as there is none: {why}",))
-    if len(dual.parts) > MOST_DRAWN:
+    if len(dual.parts) > PAGE.parts:
         return ReportSection(text, figures)
     figures["dual"] = _on_a_page(subject.network, as_circuit=True, analogy="force-voltage")
     words = in_text("In the dual circuit torque is voltage and speed is current: an inertia is an inductor.")
@@ -172,7 +167,7 @@ def model_file(subject: Subject) -> ReportSection:
     except ModelFileError as reason:
         return ReportSection(notes=(f"There is no model file: {reason}",))
     lines = [line for line in text.splitlines() if line]
-    wrapped = [piece for line in lines for piece in textwrap.wrap(line, COLUMNS, break_on_hyphens=False)]
+    wrapped = [piece for line in lines for piece in textwrap.wrap(line, PAGE.letters, break_on_hyphens=False)]
     said = "Lines that are too long for the page are wrapped." if len(wrapped) > len(lines) else ""
     body = "\n".join(wrapped).replace(r"\end{verbatim}", "\\end\n{verbatim}")  # a name may hold it
     verbatim = f"\\begingroup\\footnotesize\n\\begin{{verbatim}}\n{body}\n\\end{{verbatim}}\n\\endgroup"

@@ -6,16 +6,12 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from shaftwork.core.errors import imported
+from shaftwork.reporting.latex_parts import PAGE
 from shaftwork.results.plotting import curve, grouped
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
     from shaftwork.reporting.report import Report
-
-HEIGHT = 220
-"""Of an axis, pixels."""
-MARKED = 60
-"""Changes of mode up to which each is a line across the curves."""
 
 
 def plots(report: Report) -> Mapping[str, str]:
@@ -49,12 +45,12 @@ def _plot(plotly: Any, solution: Solution, signals: tuple[str, ...]) -> Any:
             for column in columns.T:
                 figure.add_scatter(x=times, y=column, name=name, row=row, col=1, line={"width": 1.2})
         figure.update_yaxes(title_text=unit, row=row, col=1)
-    if len(solution.events) <= MARKED:
+    if len(solution.events) <= PAGE.marks:
         for t, part, _, mode in solution.events:
             figure.add_vline(x=t, line_width=0.5, line_color="grey", name=f"{part} {mode}")
     figure.update_xaxes(title_text="t in s", row=len(groups), col=1)
     figure.update_layout(
-        height=120 + HEIGHT * len(groups), margin={"l": 60, "r": 20, "t": 30, "b": 50}, template="none"
+        height=120 + PAGE.axis * len(groups), margin={"l": 60, "r": 20, "t": 30, "b": 50}, template="none"
     )
     figure.update_layout(legend={"orientation": "h", "y": 1.02, "yanchor": "bottom"})
     return figure

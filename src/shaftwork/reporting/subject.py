@@ -12,6 +12,7 @@ from shaftwork.latex.blocks import Block, Blocks
 from shaftwork.latex.document import printed_blocks
 from shaftwork.pipeline.arguments import Point
 from shaftwork.pipeline.network import Network
+from shaftwork.reporting.latex_parts import PAGE
 from shaftwork.results.fatigue import SNLine
 from shaftwork.results.solution import Solution
 
@@ -24,9 +25,6 @@ if TYPE_CHECKING:
 
     Picture = Figure | Drawing | Path
     """What a report can show: a figure, a drawing, or a picture of the user's in a file."""
-
-MOST_PHASES = 6
-"""Combinations of modes whose equations are printed when nobody chooses."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +98,7 @@ class Subject:
             return self.phases
         if self.solution is None or not self.solution.phases:
             return (self.network.start_phase(),)
-        longest = sorted(self.durations, key=self.durations.__getitem__, reverse=True)[:MOST_PHASES]
+        longest = sorted(self.durations, key=self.durations.__getitem__, reverse=True)[: PAGE.printed_phases]
         return tuple(name for name in self.durations if name in longest)
 
     @cached_property

@@ -9,12 +9,9 @@ from shaftwork.core.errors import ParameterError, ShaftworkError
 from shaftwork.core.screen import MOST_MODES
 from shaftwork.equations.spelling import in_text
 from shaftwork.latex.nomenclature import breakable
-from shaftwork.reporting.latex_parts import columns, listed, number, paragraphs, picture
+from shaftwork.reporting.latex_parts import PAGE, columns, listed, number, paragraphs, picture
 from shaftwork.reporting.subject import ReportSection, Subject
 from shaftwork.results.observer import RPM
-
-HOLZER_MODES = 3
-"""Modes in tables of their own, the lowest."""
 
 
 def frequencies(subject: Subject) -> ReportSection:
@@ -82,7 +79,7 @@ def torsional(subject: Subject) -> ReportSection:
         _with_letters(listed(tuple(map(_with_squares, calculation.notes)))),
         picture("torsional", "Vibratory stress or torque over the speed, with the permitted stresses"),
         _resonances(calculation),
-        *map(_holzer, calculation.modes[:HOLZER_MODES]),
+        *map(_holzer, calculation.modes[: PAGE.holzer]),
         _heat(calculation),
     )
     return ReportSection(text, {"torsional": calculation.plot(*judged)})

@@ -23,25 +23,14 @@ from shaftwork.results.observer import Array, Read, blocks
 
 NODES, WEIGHTS = lobatto_rule(7)
 """Of Lobatto's rule, which reads both ends: there peaks are, and a jump close to an end is not overlooked."""
-TIGHT = 1e-13
-"""Change of an integral by parting all panels that is none, as a fraction of the integral of the integrand's size."""
-MOST_INTEGRATED = 100_000
-"""Panels of an integral; a motion that asks for more, such as torque of mere noise, is integrated as far as that."""
 SHARE = 0.41
 """Of a panel is the first of its two parts: of a jump in the middle, halves and the whole would say the same."""
-ROUGH, FINE, EVEN = 1e-3, 1e-9, 1e-6
-"""Of the range: what a polynomial may miss anywhere, where it may hold an extreme, and where all turns are wanted.
-
-A turn is read where the polynomial has it, so its height is right to the square of these.
-"""
 CLOSE, SHAKES = 1e-6 * np.arange(6), 20.0
 """Of a panel: times so close that only rounding bends what is read there; misses up to so many times this are noise."""
 ROUNDINGS = 100 * float(np.finfo(float).eps)
 """Of the largest value: what rounding alone makes a polynomial miss."""
 LOOKS = chebyshev_nodes(32)
 """Where in a panel, from -1 to 1, its polynomial is looked at."""
-SMALLEST = 1e-6
-"""Ups and downs of less than this part of the range make no peak, where nobody says otherwise."""
 
 Mask = NDArray[np.bool_]
 _RATES = to_slopes(NODES, NODES)
@@ -156,6 +145,7 @@ def integrate(
     rule: type[LobattoPanels] = LobattoPanels,
     alike: bool = False,
     size: float = 0.0,
+    most: int = 100_000,
 ) -> Integrals:
     """Integrals of several quantities over a run.
 
@@ -167,7 +157,9 @@ def integrate(
         rule: the panels.
         alike: whether the quantities are of one kind: what is little beside the largest need not be known better.
         size: the largest integral of a size over what was before, beside which it need not be known better either.
+        most: panels; a motion that asks for more, such as torque of mere noise, is integrated as far as that.
     """
+    tight = 1e-13  # of the integral of the integrand's size: a change by parting all panels that is none
     least = max(1, 64 // len(steps))  # panels of a step: an exact engine has few steps
     edges = np.append((steps[:-1, None] + np.diff(steps)[:, None] * np.arange(least) / least).ravel(), steps[-1])
     panels = rule.between(edges)
@@ -186,8 +178,8 @@ def integrate(
         count += 2 * open_
         # Small changes are noise where parting leaves three quarters of them, in half as many panels again.
         noisy = 0.75 * before[0] < rough <= 1e-9 and open_ > 1.5 * before[1]
-        done = (change <= TIGHT * scale / first).all(axis=0) | (panels.length <= shortest)
-        if rough <= TIGHT or count > MOST_INTEGRATED or noisy:
+        done = (change <= tight * scale / first).all(axis=0) | (panels.length <= shortest)
+        if rough <= tight or count > most or noisy:
             done[:] = True
         done = np.repeat(done, 2)
         scales += sizes[:, done].sum(axis=1)
@@ -275,9 +267,11 @@ def course(read: Read, steps: Array, *, even: bool = False) -> Course:
         low, high = min(low, float(values.min())), max(high, float(values.max()))
         count += len(values)
         size, miss = high - low, _missed(values) - ROUNDINGS * max(-low, high)
-        rough = miss > (EVEN if even else ROUGH) * size
+        # Less may be missed where all turns are wanted, and least where an extreme may be. A turn is read where the
+        # polynomial has it, so its height is right to the square of that.
+        rough = miss > (1e-6 if even else 1e-3) * size
         if not even:
-            rough |= (miss > FINE * size) & _may_hold_extremes(values, low, high)
+            rough |= (miss > 1e-9 * size) & _may_hold_extremes(values, low, high)
         # Two million panels take 128 MB; where a motion asks for more, as mere noise does, the rest stays rough.
         parted = np.flatnonzero(rough & (panels.length > shortest) & (count < 2_000_000))
         parted = parted[miss[parted] > SHAKES * _noise(read, panels.taken(parted))]

@@ -20,8 +20,6 @@ may miss the quantity. Seven samples in a swing miss a twentieth of it."""
 SHARES = np.arange(1, 9) * GOLDEN % 1
 """Where between its neighbours a time lies: in step with nothing that swings, and few, for engines that take as many
 matrix exponentials as there are distances from a step end."""
-MOST_READ = 4_000_000
-"""Values of several quantities that are read together, 32 MB."""
 MOST_OUTPUTS = 10_000_000
 """Output times that can be asked for."""
 
@@ -111,7 +109,7 @@ class Extremes(Mapping[str, tuple[Extreme, Extreme]]):
             SignalError: there is no such quantity.
         """
         missing = [name for name in dict.fromkeys(names) if name not in self._rows]
-        together = max(1, MOST_READ // (8 * len(self._reader.steps)))
+        together = max(1, 4_000_000 // (8 * len(self._reader.steps)))  # of 32 MB
         for first in range(0, len(missing), together):
             some = missing[first : first + together]
             with self._reader.read_ahead(some, first_times(self._reader.steps)):

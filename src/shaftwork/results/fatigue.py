@@ -11,7 +11,8 @@ import numpy as np
 
 from shaftwork.core.errors import ParameterError, SignalError, imported
 from shaftwork.core.parameters import in_si, whole, without_unit
-from shaftwork.results.course import SMALLEST, TurningPoints, turning_points
+from shaftwork.numerics.tolerances import EQUAL
+from shaftwork.results.course import TurningPoints, turning_points
 from shaftwork.results.observer import Array, Read, Reader
 from shaftwork.results.plotting import new_figure
 
@@ -128,7 +129,7 @@ class Rainflow:
         return "\n".join([f"{head}, the largest of them:", *lines, *([f"and {more} smaller"] if more > 0 else [])])
 
 
-def rainflow(read: Read, steps: Array, *, title: str, name: str, unit: str, smallest: float = SMALLEST) -> Rainflow:
+def rainflow(read: Read, steps: Array, *, title: str, name: str, unit: str, smallest: float = EQUAL) -> Rainflow:
     """Count the cycles of a quantity.
 
     Args:

@@ -22,8 +22,6 @@ RPM = 30 / np.pi
 """1/min of a rad/s."""
 Read = Callable[[Array], Array]
 """From ascending times (k,) to the values of a quantity there."""
-ASIDE = (1e-13, 1e-11, 1e-9, 1e-7, 1e-6)
-"""How far aside a value is looked for, of the time or of 1 s, and of a shorter run of that."""
 ANGLES = ("phi", "s", "psi")
 """Integrals of speeds and voltages, which are recorded when asked for."""
 
@@ -326,12 +324,13 @@ def beside(read: Callable[[Array], Array], times: Array, steps: Array) -> tuple[
         (k, ...) the limits, not a number where there is none, and finite values next to the times.
     """
     scale = min(float(steps[-1] - steps[0]), 1.0) * np.maximum(np.abs(times), 1.0)
+    nearest, *farther = 1e-13, 1e-11, 1e-9, 1e-7, 1e-6  # parts of that by which a value is looked for aside
     before = np.append(times[1:] == times[:-1], False)  # of a time listed twice the first is before what jumps there
     following = np.append(steps, np.inf)[np.searchsorted(steps, times, side="right")]
-    side = np.where(before | (following - times <= 2 * ASIDE[0] * scale) | (times >= steps[-1]), -1.0, 1.0)
+    side = np.where(before | (following - times <= 2 * nearest * scale) | (times >= steps[-1]), -1.0, 1.0)
     limit: Array = np.full_like(read(times), np.nan)
     near = limit.copy()
-    for distance in ASIDE:
+    for distance in (nearest, *farther):
         values = []
         for part in (1, 2, 4):
             aside = np.clip(times + side * part * distance * scale, steps[0], steps[-1])

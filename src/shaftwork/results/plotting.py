@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-POINTS = 2000
-"""Points of a curve besides those where it turns: more than a screen has."""
 MOST_SIGNALS = 8
 """States drawn when nobody chooses: as many as colours can be told apart."""
 
@@ -92,7 +90,7 @@ def plot_signals(
 
 def curve(reader: Reader, name: str) -> Curve:
     """A quantity of a motion at even times and where it turns, as many as can be seen."""
-    even = np.linspace(reader.steps[0], reader.steps[-1], POINTS)
+    even = np.linspace(reader.steps[0], reader.steps[-1], 2000)  # more than a screen has
     if reader.places(name):
         return even, reader.values(name, even, reader.dense(even))
     read = reader.quantity(name)
@@ -101,12 +99,12 @@ def curve(reader: Reader, name: str) -> Curve:
     order = np.argsort(times, kind="stable")
     times, values = times[order], values[order]
     # Of more points only the lowest and the highest of what falls on the same place are drawn.
-    return (times, values) if len(times) <= 20_000 else _envelope(times, values)
+    return (times, values) if len(times) <= 20_000 else _envelope(times, values, even.size)
 
 
-def _envelope(times: Array, values: Array) -> Curve:
-    """The lowest and the highest of what falls on the same place of the picture, in their order."""
-    firsts = np.unique(np.searchsorted(times, np.linspace(times[0], times[-1], POINTS, endpoint=False)))
+def _envelope(times: Array, values: Array, count: int) -> Curve:
+    """The lowest and the highest of what falls on the same of so many places of the picture, in their order."""
+    firsts = np.unique(np.searchsorted(times, np.linspace(times[0], times[-1], count, endpoint=False)))
     places = [
         first + place
         for first, part in zip(firsts.tolist(), np.split(values, firsts[1:]), strict=True)

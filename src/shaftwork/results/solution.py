@@ -15,7 +15,7 @@ from shaftwork.core.notebook import html_table
 from shaftwork.core.notices import warn
 from shaftwork.core.screen import counted, named, on_one_screen
 from shaftwork.integrate.problem import TOLERATED, UNSURPRISING
-from shaftwork.results.course import SMALLEST
+from shaftwork.numerics.tolerances import EQUAL
 from shaftwork.results.data_frames import to_pandas, to_xarray
 from shaftwork.results.energy import EnergyBalance, energy_balance
 from shaftwork.results.extremes import Extreme, Extremes, warn_of_coarse_samples
@@ -230,7 +230,7 @@ class Solution(StoredMotion):
 
         return animate(self.reader, names or self.states[:3], self.phases, span_of(self.reader, start, end), seconds)
 
-    def rainflow(self, name: str, *, place: int | None = None, smallest: float = SMALLEST) -> Rainflow:
+    def rainflow(self, name: str, *, place: int | None = None, smallest: float = EQUAL) -> Rainflow:
         """The load cycles of a quantity, such as "shaft.tau", over the run (extra `life`).
 
         Peaks and valleys are those of the motion, from the dense output, not of the output times.
@@ -304,15 +304,15 @@ class Solution(StoredMotion):
         return order_spectra(self.reader, name, speed, place, turns, order_max, (start, end))
 
     @overload
-    def damage(self, name: str, *, sn: SNLine, smallest: float = SMALLEST) -> Damage: ...
+    def damage(self, name: str, *, sn: SNLine, smallest: float = EQUAL) -> Damage: ...
 
     @overload
     def damage(
-        self, name: None = None, *, sn: SNLine | Mapping[str, SNLine], smallest: float = SMALLEST
+        self, name: None = None, *, sn: SNLine | Mapping[str, SNLine], smallest: float = EQUAL
     ) -> dict[str, Damage]: ...
 
     def damage(
-        self, name: str | None = None, *, sn: SNLine | Mapping[str, SNLine], smallest: float = SMALLEST
+        self, name: str | None = None, *, sn: SNLine | Mapping[str, SNLine], smallest: float = EQUAL
     ) -> Damage | dict[str, Damage]:
         """What the motion takes from the life of a part, at the worst place of a long shaft (extra `life`).
 

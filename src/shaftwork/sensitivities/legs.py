@@ -14,7 +14,7 @@ from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.timeline import Timeline
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.problem import Problem
-from shaftwork.numerics.tolerances import SAME
+from shaftwork.numerics.tolerances import ROUNDINGS, SAME
 from shaftwork.numerics.zeros import LOOKS, zero
 from shaftwork.pipeline.arguments import Demand, Given
 from shaftwork.pipeline.model import Model
@@ -32,8 +32,6 @@ if TYPE_CHECKING:
 LATE = 1e-5
 """The run meets limits late by what rounding moves them, which is much for what hardly moves any more: by up to this
 part of the run, with states that are off by up to this part of their size."""
-ASIDE = 4
-"""Rounding units of time by which a law is read beside its switch, and by how much more where that is too near."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +77,7 @@ class Leg:
 
 def parted(leg: Leg, equations: Differentiated) -> Iterator[Leg]:
     """A leg parted where the motion makes a law jump or bend."""
-    grain = ASIDE * float(np.spacing(max(abs(leg.start), abs(leg.end))))
+    grain = ROUNDINGS * float(np.spacing(max(abs(leg.start), abs(leg.end))))
     met: dict[float, list[int]] = {}
     for time, number in sorted(_turned(leg, equations)):
         last = next(reversed(met), -np.inf)
@@ -119,7 +117,7 @@ def _beside(
         before, after = equations.turning(*leg.read(np.array([low, high])), leg.p)[:, list(numbers)]
         if (before * after < 0).all() or low == leg.low or high == leg.high:
             return low, high
-        aside *= ASIDE
+        aside *= 4  # too near
 
 
 @dataclass(frozen=True, eq=False)

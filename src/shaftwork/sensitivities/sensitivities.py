@@ -18,12 +18,12 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.errors import ParameterError, SimulationError
 from shaftwork.formulation.sampling_instants import refuse_sampled
-from shaftwork.numerics.tolerances import TYPED
+from shaftwork.numerics.tolerances import EQUAL, TYPED
 from shaftwork.pipeline.arguments import Given, Point, Time, by_name, relative_tolerance, time_span
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import refuse_motion
 from shaftwork.pipeline.network import Network, network_of
-from shaftwork.results.course import SMALLEST, turning_points
+from shaftwork.results.course import turning_points
 from shaftwork.results.measures import EXTREMES, KINDS, POWERS, Measure
 from shaftwork.results.observer import Complex
 from shaftwork.results.solution import Solution
@@ -101,7 +101,6 @@ def _roundings(matrix: Array, left: Complex, right: Complex) -> Array:
 
 
 def _refuse_equal(rates: Complex, chosen: NDArray[np.intp], roundings: Array) -> None:
-    from shaftwork.frequency.natural_modes import EQUAL
 
     for number, k in enumerate(chosen.tolist()):
         others = np.delete(rates, k)
@@ -231,7 +230,7 @@ def measured(
 
 
 def _extreme(measure: Measure, slopes: MotionSlopes) -> tuple[float, Array]:
-    turns = turning_points(lambda times: slopes.values(measure.quantity, times), slopes.steps, smallest=SMALLEST)
+    turns = turning_points(lambda times: slopes.values(measure.quantity, times), slopes.steps, smallest=EQUAL)
     heights = {"max": turns.values, "min": -turns.values, "peak": np.abs(turns.values)}[measure.kind]
     level = heights.max() - TYPED * float(np.ptp(turns.values))
     highest = np.flatnonzero(heights >= level).tolist()

@@ -14,8 +14,8 @@ import numpy as np
 from shaftwork.components.drives import Nameplate
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import in_si, numbers_in_si
+from shaftwork.numerics.tolerances import TYPED
 from shaftwork.results.observer import RPM, Array
-from shaftwork.sizing.motor_shaft import SMALLEST
 
 OWN = Path(__file__).with_name("motors.csv")
 TYPICAL = "chosen: typical of a motor of this frame size and power; frame sizes by power after EN 50347"
@@ -106,7 +106,7 @@ class CatalogueMotor:
         speeds = np.asarray(numbers_in_si("n", n, "1/min"), dtype=float)
         n_k = self.n_sync * (1 - self.nameplate.s_k)
         weakened = self.tau_k * (n_k / np.maximum(speeds, n_k)) ** 2
-        return np.where(speeds <= self.fastest * (1 + SMALLEST), weakened, 0.0)
+        return np.where(speeds <= self.fastest * (1 + TYPED), weakened, 0.0)
 
 
 NUMBERS: Mapping[str, tuple[str, Mapping[str, Any]]] = {

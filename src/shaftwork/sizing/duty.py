@@ -12,10 +12,10 @@ import numpy as np
 
 from shaftwork.core.errors import ParameterError, imported
 from shaftwork.core.parameters import in_si
-from shaftwork.numerics.tolerances import SAME
+from shaftwork.numerics.tolerances import SAME, TYPED
 from shaftwork.results.course import LobattoPanels, integrate, turning_points
 from shaftwork.results.observer import RPM, Array
-from shaftwork.sizing.motor_shaft import SMALLEST, MotorShaft, motor_shaft, run_up
+from shaftwork.sizing.motor_shaft import MotorShaft, motor_shaft, run_up
 from shaftwork.sizing.reserve import Limit, Reserve, reserve_of, speed_torque_plane
 
 if TYPE_CHECKING:
@@ -233,7 +233,7 @@ class Duty:
         """Times in s at which the speed jumps, the start of the motion among them where it jumps from rest."""
         shaft, start, ends = self.shaft, self.shaft.steps[:1], self.shaft.steps[1:]
         before, after = shaft.omega(np.nextafter(ends, -np.inf)), shaft.omega(ends)
-        least, prescribed = SMALLEST * shaft.omega_top, abs(shaft.omega_prescribed)
+        least, prescribed = TYPED * shaft.omega_top, abs(shaft.omega_prescribed)
         return np.concatenate([start[[prescribed > least]], ends[np.abs(after - before) > least]])
 
     @property
@@ -245,7 +245,7 @@ class Duty:
             notes.append(
                 f"at the motor's shaft, before {whose}: ratio {shaft.ratio:g}, efficiency {shaft.efficiency:g}"
             )
-        if self.held > SMALLEST * self.duration:
+        if self.held > TYPED * self.duration:
             notes.append(f"torque is held at standstill for {self.held:.6g} s; at_rest='released' if a brake does that")
         start, last = shaft.steps[0], "what an inertia rigidly there takes at once is in no figure"
         if start in self.jumps:
@@ -332,8 +332,8 @@ def _measured(shaft: MotorShaft, motion: float, whole: float, cold: float, n_ful
             rows += [flow, flow**2, (flow > 0) & loads & ~still]
         return np.array(rows, dtype=float).reshape(-1, *panels.times.shape)
 
-    tau = turning_points(lambda t: shaft.read(t)[0], shaft.steps, smallest=SMALLEST).values
-    power = turning_points(lambda t: np.multiply(*shaft.read(t)), shaft.steps, smallest=SMALLEST).values
+    tau = turning_points(lambda t: shaft.read(t)[0], shaft.steps, smallest=TYPED).values
+    power = turning_points(lambda t: np.multiply(*shaft.read(t)), shaft.steps, smallest=TYPED).values
     integrals = integrate(integrand, shaft.steps)
     total, panels = integrals.totals, integrals.panels
     impulse, heat, power_square, turned, loaded, holding, cooled, *flows = total.tolist()

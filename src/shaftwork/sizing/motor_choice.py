@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from shaftwork.core.errors import ParameterError, imported
 from shaftwork.core.parameters import in_si
-from shaftwork.numerics.tolerances import SAME
+from shaftwork.numerics.tolerances import SAME, TYPED
 from shaftwork.results.course import LobattoPanels
 from shaftwork.results.observer import RPM, Array
 from shaftwork.sizing.catalogue import SHOWN, CatalogueMotor, catalogue
 from shaftwork.sizing.duty import Duty, cooling_at
-from shaftwork.sizing.motor_shaft import SMALLEST, zeros
+from shaftwork.sizing.motor_shaft import zeros
 from shaftwork.sizing.reserve import speed_torque_plane
 
 if TYPE_CHECKING:
@@ -257,7 +257,7 @@ def _candidate(demand: _Demand, motor: CatalogueMotor, contained: float, overloa
 
 
 def _reasons(motor: CatalogueMotor, thermal: float, reserve: float, n_top: float, overload: float) -> Iterator[str]:
-    if n_top > motor.fastest * (1 + SMALLEST):
+    if n_top > motor.fastest * (1 + TYPED):
         yield f"speed {n_top:.4g} above {motor.fastest:.4g} 1/min"
     elif reserve < overload:
         yield f"overload reserve {reserve:.3g} below {overload:.3g}"

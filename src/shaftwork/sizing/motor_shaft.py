@@ -17,19 +17,14 @@ from shaftwork.components.sources import SpeedSource
 from shaftwork.core.errors import ParameterError, SignalError
 from shaftwork.core.parameters import in_si
 from shaftwork.network.netlist import at_nodes, listed
-from shaftwork.numerics.tolerances import EPS, SAME
+from shaftwork.numerics.tolerances import EPS, SAME, TYPED
 from shaftwork.results.course import LobattoPanels, turning_points
 from shaftwork.results.observer import Array, Read, blocks
 from shaftwork.results.solution import Solution
 
-SMALLEST = 1e-9
-"""Less than this part of a range, a cycle or a limit is none: ups and downs make no peak, jumps take no time, and what
-is above a limit by it is not above it."""
 CONSTANT, FLAT = 4 * EPS, 45 * EPS
 """What changes by no more than this part of itself is constant; a step in which the speed changes by no more than this
 part of the highest one is part of a plateau."""
-SAMPLES = 4001
-"""Times among which a speed is looked for, and those of a curve of a whole motion."""
 GEARED = ("ratio", "efficiency")
 """Parameters of a motor that has a gear of its own."""
 
@@ -76,9 +71,14 @@ class MotorShaft:
         return self.solution.reader.quantity(self.speed)
 
     @cached_property
+    def even(self) -> Array:
+        """Even times over the motion, s, among which a speed is looked for and at which its curves are drawn."""
+        return np.linspace(self.steps[0], self.steps[-1], 4001)
+
+    @cached_property
     def omega_top(self) -> float:
         """Highest speed of the motor in size, rad/s."""
-        speeds = turning_points(self._omega, self.steps, smallest=SMALLEST).values
+        speeds = turning_points(self._omega, self.steps, smallest=TYPED).values
         return float(np.abs(speeds).max()) * abs(self.ratio)
 
     @property
@@ -270,9 +270,9 @@ def run_up(shaft: MotorShaft, share: float) -> float:
         shaft: of a motor that moves.
         share: of the highest speed, up to 1.
     """
-    turns = turning_points(lambda times: np.abs(shaft.omega(times)), shaft.steps, smallest=SMALLEST).t
+    turns = turning_points(lambda times: np.abs(shaft.omega(times)), shaft.steps, smallest=TYPED).t
     marks = np.unique(np.concatenate([shaft.steps, turns]))
-    times = np.unique(np.concatenate([marks, np.linspace(shaft.steps[0], shaft.steps[-1], SAMPLES)]))
+    times = np.unique(np.concatenate([marks, shaft.even]))
     reached = _top(shaft, marks) if share == 1 else _first(shaft, times, share * shaft.omega_top)
     return reached - _start(shaft, times[times <= reached])
 

@@ -17,12 +17,13 @@ from shaftwork.components.tables import Table, interpolate
 from shaftwork.core.errors import NetworkWarning, ParameterError, ShaftworkError
 from shaftwork.core.notices import muted
 from shaftwork.core.parameters import in_si
+from shaftwork.numerics.tolerances import TYPED
 from shaftwork.pipeline.network import Network
 from shaftwork.results.course import turning_points
 from shaftwork.results.observer import RPM, Array
 from shaftwork.results.plotting import new_figure
 from shaftwork.sizing.catalogue import CatalogueMotor
-from shaftwork.sizing.motor_shaft import SAMPLES, SMALLEST, MotorShaft
+from shaftwork.sizing.motor_shaft import MotorShaft
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,12 +33,8 @@ Limit = float | Table | Callable[[Array], Array] | None
 """Largest torque in size, N m, over the motor's speed without sign in 1/min; None for the motor's own."""
 Curve = Callable[[Array, Array], Array]
 """A torque in N m at times (k,) in s and speeds (k,): of a motor in rad/s, largest ones without sign in 1/min."""
-NO_LIMIT = 1 / SMALLEST
+NO_LIMIT = 1 / TYPED
 """Torque over its limit where there is none left of it."""
-SPEEDS, BEYOND = 129, 1.5
-"""Speeds among which the largest torque is looked for, up to this many times the highest speed, both ways."""
-CURVE, CURVES = 400, 4
-"""Points of a curve of torque over speed; curves of a motor that changes its own with time, at equal steps of time."""
 AS_ARRAY = (
     "Let it take an array of speeds in 1/min and give as many torques in N m: lambda n: np.where(n < 1500, 20.0, 10.0)."
 )
@@ -78,8 +75,8 @@ def reserve_of(shaft: MotorShaft, limit: Limit) -> Reserve:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(tau == 0, 0.0, np.minimum(np.abs(tau) / most, NO_LIMIT))
 
-    worst = turning_points(used, shaft.steps, smallest=SMALLEST)
-    place = int((worst.values >= (1 - SMALLEST) * worst.values.max()).argmax())
+    worst = turning_points(used, shaft.steps, smallest=TYPED)
+    place = int((worst.values >= (1 - TYPED) * worst.values.max()).argmax())
     time = worst.t[place : place + 1]
     (tau,), (omega,) = shaft.read(time)
     (most,) = limited(time, np.abs([omega]) * RPM)
@@ -175,9 +172,9 @@ def _pull_out(curve: Curve, times: Array, top: float) -> Array:
         times: (k,) s.
         top: a speed in rad/s that is not far below those of the curve.
     """
-    omega = np.linspace(-BEYOND * top, BEYOND * top, SPEEDS)
-    tau = np.abs(curve(np.repeat(times, SPEEDS), np.tile(omega, len(times)))).reshape(len(times), SPEEDS)
-    near = np.clip(tau.argmax(axis=1), 1, SPEEDS - 2)
+    omega = np.linspace(-1.5 * top, 1.5 * top, 129)  # both ways, and beyond the highest speed
+    tau = np.abs(curve(np.repeat(times, omega.size), np.tile(omega, len(times)))).reshape(len(times), omega.size)
+    near = np.clip(tau.argmax(axis=1), 1, omega.size - 2)
     bracket = omega[near - 1], omega[near], omega[near + 1]
     peak = find_minimum(lambda w, t: -np.abs(curve(t, w)), bracket, args=(times,))
     return np.asarray(np.where(peak.success, -peak.f_x, tau.max(axis=1)))
@@ -208,7 +205,7 @@ def speed_torque_plane(shaft: MotorShaft, thermal: float, limit: Limit | Catalog
     figure.colorbar(points, ax=axes, label="t in s")
     axes.plot(n, tau, color="0.6", linewidth=0.6, zorder=2)
     top = 1.15 * max(shaft.omega_top * RPM, limit.fastest if isinstance(limit, CatalogueMotor) else 0.0)
-    speeds = np.linspace(-top if n.min() < -1e-6 * top else 0.0, top, CURVE)
+    speeds = np.linspace(-top if n.min() < -1e-6 * top else 0.0, top, 400)
     _draw_own(axes, shaft, speeds)
     if limit is not None:
         _draw_limit(axes, shaft, limit, speeds)
@@ -226,9 +223,7 @@ def speed_torque_plane(shaft: MotorShaft, thermal: float, limit: Limit | Catalog
 def _trajectory(shaft: MotorShaft) -> tuple[Array, Array, Array]:
     """Times, torques and speeds, both sides of every step's end among them."""
     steps = shaft.steps
-    times = np.unique(
-        np.concatenate([np.linspace(steps[0], steps[-1], SAMPLES), steps, np.nextafter(steps[1:], -np.inf)])
-    )
+    times = np.unique(np.concatenate([shaft.even, steps, np.nextafter(steps[1:], -np.inf)]))
     tau, omega = shaft.read(times)
     return times, tau, omega * RPM
 
@@ -238,10 +233,10 @@ def _draw_own(axes: Axes, shaft: MotorShaft, speeds: Array) -> None:
     curve = own_curve(shaft.part, shaft.steps)
     if curve is None:
         return
-    instants = np.linspace(shaft.steps[0], shaft.steps[-1], CURVES + 2)[1:-1]
-    curves = [curve(np.full(CURVE, time), speeds / RPM) for time in instants.tolist()]
+    instants = np.linspace(shaft.steps[0], shaft.steps[-1], 6)[1:-1]  # four curves at even times can be told apart
+    curves = [curve(np.full(speeds.size, time), speeds / RPM) for time in instants.tolist()]
     steady = all(np.array_equal(curves[0], torques) for torques in curves)
-    for time, torques in list(zip(instants.tolist(), curves, strict=True))[: 1 if steady else CURVES]:
+    for time, torques in list(zip(instants.tolist(), curves, strict=True))[: 1 if steady else None]:
         label = f"curve of {shaft.name}" if steady else f"curve of {shaft.name} at {time:.3g} s"
         axes.plot(speeds, torques, linewidth=1.2, alpha=0.8, label=label)
 
@@ -252,6 +247,6 @@ def _draw_limit(axes: Axes, shaft: MotorShaft, limit: Limit | CatalogueMotor, sp
     if isinstance(limit, CatalogueMotor):
         axes.axhline(limit.tau_n, color="tab:green", linestyle="--", linewidth=1, label="rated torque")
         name, limit = f"limit of {limit.name}", limit.limit
-    most = limits(shaft, limit)(np.full(CURVE, shaft.steps[-1]), np.abs(speeds))
+    most = limits(shaft, limit)(np.full(speeds.size, shaft.steps[-1]), np.abs(speeds))
     axes.plot(speeds, most, color="tab:red", linewidth=1.2, label=name)
     axes.plot(speeds, -most, color="tab:red", linewidth=1.2)

@@ -14,7 +14,7 @@ from shaftwork.core.parameters import in_si
 from shaftwork.core.screen import ROWS, in_columns
 from shaftwork.results.observer import RPM, Array, Reader, span_of
 from shaftwork.results.plotting import new_figure, plain
-from shaftwork.spectra.spectrum import MOST, number_of, refined, windowed
+from shaftwork.spectra.spectrum import MOST_SAMPLES, number_of, refined, windowed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -121,7 +121,7 @@ def order_spectra(
         return windowed(read(at.ravel()).reshape(at.shape))
 
     fewest = int(np.ceil(4 * highest * turning))  # twice what the sampling theorem needs
-    most = max(fewest, MOST // len(starts))
+    most = max(fewest, MOST_SAMPLES // len(starts))
     amplitudes = refined(sampled, fewest, most, f"the order spectra of '{name}' over {turning:g} turns")
     orders = np.arange(amplitudes.shape[1]) / turning
     inside = orders <= highest

@@ -22,7 +22,7 @@ from shaftwork.results.plotting import new_figure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FEWEST, MOST = 2**12, 2**20
+FEWEST_SAMPLES, MOST_SAMPLES = 2**12, 2**20
 """Samples of a span."""
 
 
@@ -77,16 +77,16 @@ def spectrum(
     """The spectrum of a quantity; arguments as of `Solution.spectrum`."""
     first, last = span_of(reader, start, end)
     wanted = None if f_max is None else in_si("f_max", f_max, "Hz")
-    if wanted is not None and not 2.0 <= wanted * (last - first) < MOST / 4:  # two lines at least
-        lowest, highest = 2.0 / (last - first), MOST / 4 / (last - first)
+    if wanted is not None and not 2.0 <= wanted * (last - first) < MOST_SAMPLES / 4:  # two lines at least
+        lowest, highest = 2.0 / (last - first), MOST_SAMPLES / 4 / (last - first)
         raise ParameterError(f"f_max = {wanted:g} Hz must be {lowest:g} to {highest:g} Hz over {last - first:g} s.")
     read = reader.quantity(name, number_of(reader, name, place))
 
     def sampled(count: int) -> Array:
         return windowed(read(np.linspace(first, last, count, endpoint=False)))
 
-    fewest = FEWEST if wanted is None else max(FEWEST, int(4 * wanted * (last - first)))
-    amplitudes = refined(sampled, fewest, MOST, f"the spectrum of '{name}' over {last - first:g} s")
+    fewest = FEWEST_SAMPLES if wanted is None else max(FEWEST_SAMPLES, int(4 * wanted * (last - first)))
+    amplitudes = refined(sampled, fewest, MOST_SAMPLES, f"the spectrum of '{name}' over {last - first:g} s")
     frequencies = np.arange(len(amplitudes)) / (last - first)
     inside = slice(None) if wanted is None else frequencies <= wanted
     return Spectrum(reader.title, name, reader.unit(name), frequencies[inside], amplitudes[inside])

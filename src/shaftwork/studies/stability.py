@@ -18,6 +18,7 @@ from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationErro
 from shaftwork.core.files import write_rows
 from shaftwork.core.screen import in_columns
 from shaftwork.integrate.engines import ENGINE_NAMES, available
+from shaftwork.numerics.tolerances import SAME
 from shaftwork.pipeline.arguments import NOMINAL, engine_names, several
 from shaftwork.pipeline.model import Model
 from shaftwork.results.observer import Array
@@ -25,15 +26,13 @@ from shaftwork.results.plotting import new_figure
 from shaftwork.studies.stability_cases import CASES, TORQUE, Case
 from shaftwork.studies.study_arguments import shaft_models, text_of
 from shaftwork.studies.truth import ENDS, MOST_PREDICTED, ShaftMotion, exact, predicted
-from shaftwork.studies.work_precision_result import FLOOR
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-RIGHT = 1e-2
-"""Largest error of what is right, of the largest torque or speed."""
-SAME = 1e-3
-"""Largest deviation of a run from what its model must do, and largest residual of its energy balance."""
+RIGHT, FAITHFUL = 1e-2, 1e-3
+"""Parts of the largest torque or speed: largest error of what is right; largest deviation of a run from what its model
+must do, and largest residual of its energy balance."""
 MOST_BALANCED = 2 * MOST_PREDICTED
 """Up to so many states, a speed and a torque for each element, the energy balance is drawn for the engine "auto", where
 all of the motion is output."""
@@ -247,10 +246,10 @@ def judge(error: float, deviation: float, energy: float, uncertainty: float, *, 
         uncertainty: error of the truth itself.
         warned: whether a warning was given.
     """
-    sound = np.isfinite(error) and not energy > SAME and not deviation > SAME + uncertainty
+    sound = np.isfinite(error) and not energy > FAITHFUL and not deviation > FAITHFUL + uncertainty
     if sound and error <= RIGHT + uncertainty:
         return "right"
-    if sound and deviation <= SAME + uncertainty:
+    if sound and deviation <= FAITHFUL + uncertainty:
         return "coarse"
     if warned:
         return "warned"
@@ -293,7 +292,7 @@ def _figure(study: Stability) -> Figure:
         column = kinds.index(kind_of[cell.model]) * len(engines) + engines.index(cell.engine)
         numbers[row, column] = 1 + names.index(cell.verdict)
         if np.isfinite(cell.error):
-            exponent = int(np.ceil(np.log10(max(cell.error, FLOOR))))
+            exponent = int(np.ceil(np.log10(max(cell.error, SAME))))
             colour = "white" if cell.verdict in ("right", "wrong") else "black"
             axes.text(column, row, str(exponent), ha="center", va="center", fontsize=6, color=colour)
     axes.imshow(numbers, cmap=ListedColormap(["#ffffff", *COLOURS.values()]), vmin=0, vmax=len(names), aspect="auto")

@@ -36,10 +36,9 @@ QUANTITIES = ("tau_a", "tau_b", "tau_mid", "omega_a", "omega_b")
 ENDS = tuple(name for name in QUANTITIES if name != "tau_mid")
 COARSE = Spectral(8)
 """The model of a network whose shafts are then taken without one."""
-FINE, FINER = 48, 64
-"""Degrees of two spectral models whose difference says how well the finer one stands for the truth."""
-TIGHT = 1e-11
-"""Tolerance of runs that stand for the truth."""
+FINE, FINER, TIGHT = 48, 64, 1e-11
+"""Degrees of two spectral models whose difference says how well the finer one stands for the truth; tolerance of what
+stands for it."""
 NONLINEAR, LOOSER = (8, 12, 16, 24, 32), 1e-8
 """The same for a nonlinear network that no wave solves, up to where two are alike: its modes are stepped through one by
 one, and of a shaft that is damped the high ones do not matter."""

@@ -14,6 +14,7 @@ import numpy as np
 
 from shaftwork.core.files import write_rows
 from shaftwork.core.screen import in_columns
+from shaftwork.numerics.tolerances import SAME
 from shaftwork.results.observer import Array
 from shaftwork.results.plotting import new_figure
 from shaftwork.studies.study_arguments import LADDER, family_of, text_of
@@ -25,8 +26,6 @@ RTOL = 1e-8
 """Relative tolerance of the runs where none is given."""
 MARKERS = "osD^vP*X<>"
 """One for each kind of model, the same in every study; the colours go with them."""
-FLOOR = 1e-12
-"""Errors below this part of the largest value are drawn here: they are rounding."""
 
 
 @dataclass(frozen=True)
@@ -208,7 +207,7 @@ def _work_precision_figure(study: WorkPrecision) -> Figure:
             families.setdefault(trial.family, []).append(trial)
     for family, members in families.items():
         style = _style(family, families)
-        errors = [max(trial.error, FLOOR) for trial in members]
+        errors = [max(trial.error, SAME) for trial in members]
         costs = [1e3 * trial.cpu for trial in members]
         sizes = [float(max(trial.states, 1)) for trial in members]
         for axis, values in zip(axes, (costs, sizes), strict=True):
@@ -236,7 +235,7 @@ def _courses_figure(study: WorkPrecision, end: str) -> Figure:
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     column, symbol = ("ab".index(end), rf"$\tau_{end}$")
     true = study.courses[:, column]
-    least = FLOOR * (np.abs(true).max(initial=0.0) or 1.0)
+    least = SAME * (np.abs(true).max(initial=0.0) or 1.0)
     families = [trial.family for trial in study.representatives]
     for trial, dashes in zip(study.representatives, itertools.cycle(("-", "--", "-.", ":")), strict=False):
         assert trial.courses is not None  # noqa: S101 (that of a representative)

@@ -18,6 +18,7 @@ from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import CompileError, NetworkError
 from shaftwork.network.graph import GraphPart
+from shaftwork.numerics.tolerances import TYPED
 from shaftwork.pipeline.model import Model
 from shaftwork.results.measures import EXTREMES, POWERS, Measure
 from shaftwork.sweep.ensemble_equations import (
@@ -29,7 +30,7 @@ from shaftwork.sweep.ensemble_equations import (
     VariantGroup,
     joined,
 )
-from shaftwork.sweep.lane_steps import NEAR, Index, LaneRun, Mask, Room, Steps, first_rises, largest
+from shaftwork.sweep.lane_steps import Index, LaneRun, Mask, Room, Steps, first_rises, largest
 
 FADING = "A law fades to a constant, as exp and tanh do, and a long step might pass over where it changes."
 
@@ -253,7 +254,7 @@ class _VariantCourse:
             new, same = after.code.stored(t, x, parameters), np.ones(t.size, dtype=bool)
             for kind in after.code.kinds:
                 size = np.maximum(np.abs(old[kind]).max(axis=0, initial=0.0), 1.0)
-                same &= (np.abs(new[kind] - old[kind]) <= NEAR * size).all(axis=0)
+                same &= (np.abs(new[kind] - old[kind]) <= TYPED * size).all(axis=0)
             groups.append(VariantGroup(modes, group.lanes[there], t, x).some(same))
         return groups
 

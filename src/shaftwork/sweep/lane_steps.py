@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.numerics.hermite import BEYOND, apart, inner, quintic
+from shaftwork.numerics.tolerances import TYPED
 from shaftwork.numerics.zeros import Chosen, zeros
 
 OF_A_STEP, LOOSEST_TOLERANCE, TIGHTEST_TOLERANCE = 0.1, 1e-7, 1e-13
@@ -29,12 +30,6 @@ STILL = 8 * float(np.finfo(float).eps)
 
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
-NEARLY = 0.1
-"""Of the range: so near to the top a peak and a dip between the same two samples are looked for."""
-NEAR = 1e-9
-"""Of the range: a peak is known where Newton's step rises by less, or a polynomial misses it by less; one that is so
-near zero need not be found. Of the time: between samples that are closer the larger one is the peak. What is stored has
-gone over unchanged where it differs by less than this part of the largest of its kind, and of 1."""
 ROUNDING, ROUNDINGS = 2 * float(np.finfo(float).eps), 16
 """A time is known to rounding, and to so many roundings of the step."""
 There = Callable[[Index, Index, Array], Array]
@@ -207,7 +202,7 @@ def largest(t: Array, jets: Array, best: Array, there: There) -> Array:
     """
     top, bottom = jets[0].max(axis=0), jets[0].min(axis=0)
     tops, size = np.maximum(best, top), top - bottom
-    at, lanes = likely(t, jets, tops, tops - NEARLY * size)
+    at, lanes = likely(t, jets, tops, tops, size)
     left, right = (np.array([t[k, lanes], *jets[:, k, lanes]]) for k in (at, at + 1))
     times, height = peak(left, right)
     missed, surely = beyond(left, right), tops.copy()
@@ -224,7 +219,7 @@ def largest(t: Array, jets: Array, best: Array, there: There) -> Array:
         at, lanes, missed, room, before = (np.tile(values, 2) for values in (at, lanes, missed, room, times))
         left, right = np.concatenate([left, middle], axis=1), np.concatenate([middle, right], axis=1)
         times, height = peak(left, right)
-        near = NEAR * size[lanes]
+        near = TYPED * size[lanes]
         # what a polynomial misses grows with the cube of the distance from a point that it goes through
         part = np.abs(times - before) / room
         sure = (part < 0.01) & (missed * part**3 < near)
@@ -234,18 +229,18 @@ def largest(t: Array, jets: Array, best: Array, there: There) -> Array:
     return np.asarray(tops)
 
 
-def likely(t: Array, jets: Array, least: Array, near: Array) -> tuple[Index, Index]:
+def likely(t: Array, jets: Array, least: Array, top: Array, size: Array) -> tuple[Index, Index]:
     """Samples (c,) of lanes (c,) after which there may be a peak of at least so much (k,).
 
-    The slope falls through zero, or, where one of the samples is near (k,) the top, does so and rises again. A
-    polynomial is no higher than the highest of its Bernstein coefficients.
+    The slope falls through zero, or, where one of the samples is within a tenth of the range (k,) of the top (k,), does
+    so and rises again. A polynomial is no higher than the highest of its Bernstein coefficients.
     """
-    up, high = jets[1] > 0, jets[0] >= near
+    up, high = jets[1] > 0, jets[0] >= top - 0.1 * size
     at, lanes = np.divmod(np.flatnonzero((up[:-1] & ~up[1:]) | high[:-1] | high[1:]), t.shape[1])
     left, right = (np.array([t[k, lanes], *jets[:, k, lanes]]) for k in (at, at + 1))
     length = right[0] - left[0]
     highest = reduce(np.maximum, inner(length, left[1:], right[1:]))
-    chosen = (length > NEAR * np.abs(left[0])) & (highest > np.maximum(left[1], right[1]))
+    chosen = (length > TYPED * np.abs(left[0])) & (highest > np.maximum(left[1], right[1]))
     chosen &= highest + beyond(left, right) >= least[lanes]
     return at[chosen], lanes[chosen]
 
@@ -319,7 +314,7 @@ def _hidden(t: Array, jets: Array, until: Index, there: There) -> tuple[list[int
     """Samples, lanes and times of values above zero between samples that are not, up to samples (k,)."""
     top, bottom = jets[0].max(axis=0), jets[0].min(axis=0)
     size = top - bottom
-    at, lanes = likely(t, jets, np.zeros_like(top), top - NEARLY * size)
+    at, lanes = likely(t, jets, np.zeros_like(top), top, size)
     early = at < until[lanes]
     at, lanes = at[early], lanes[early]
     left, right = (np.array([t[k, lanes], *jets[:, k, lanes]]) for k in (at, at + 1))
@@ -328,7 +323,7 @@ def _hidden(t: Array, jets: Array, until: Index, there: There) -> tuple[list[int
         if not lanes.size:
             break
         times, height = peak(left, right)
-        on = height + beyond(left, right) > NEAR * size[lanes]
+        on = height + beyond(left, right) > TYPED * size[lanes]
         at, lanes, left, right, times = at[on], lanes[on], left[:, on], right[:, on], times[on]
         if not lanes.size:
             break

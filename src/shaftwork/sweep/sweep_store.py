@@ -30,8 +30,6 @@ try:
 except ImportError:  # a system without such locks
     fcntl = None  # type: ignore[assignment]
 
-FORMAT = 2
-
 
 class Store:
     """The file of a sweep, which is for one sweep at a time, until it is closed.
@@ -226,7 +224,7 @@ def _title(task: Task) -> dict[str, str | int]:
     options = {**task.options, **({"steady": True} if task.steady else {})}.items()
     parts = "\n".join(repr(placed) for placed in task.network.netlist().placed)
     return {
-        "format": FORMAT,
+        "format": 2,
         "network": f"{task.network.name} {hashlib.sha256(parts.encode()).hexdigest()}",
         "parameters": f"{', '.join(task.columns)} {table.hexdigest()}",
         "measures": _measures(task.measures),

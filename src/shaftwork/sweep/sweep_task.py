@@ -46,10 +46,9 @@ from shaftwork.results.solution import Solution
 if TYPE_CHECKING:
     from shaftwork.sweep.ensemble import Ensemble
 
-SIDE_BY_SIDE = 16
-"""Variants from which on it is worth while to compile a program for many of them."""
-CHUNK, LONE_CHUNK = 2048, 8
-"""Variants that are computed and stored at once: side by side, and one by one."""
+SIDE_BY_SIDE, CHUNK, LONE_CHUNK = 16, 2048, 8
+"""Variants: from which on it is worth while to compile a program for many of them; and that are computed and stored at
+once, side by side and one by one."""
 
 
 Index = NDArray[np.intp]

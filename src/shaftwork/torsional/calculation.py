@@ -155,9 +155,9 @@ def _completed(sections: Sequence[Any], net: Network, shafts: Mapping[str, str])
 
 def _refined(speeds: Array, resonances: Sequence[tuple[float, float]]) -> Array:
     """The speeds with those of resonances, and some beside each by its damping."""
-    from shaftwork.torsional.forced_train import SPREAD
-
-    beside = [speed * (1 + damping * step) for speed, damping in resonances for step in (SPREAD if damping else (0.0,))]
+    # In damping ratios: the response falls to 0.7 at 1 and to 0.24 at 4, so lines between these show a peak as it is.
+    spread = (0.0, -0.5, 0.5, -1.0, 1.0, -2.0, 2.0, -4.0, 4.0)
+    beside = [speed * (1 + damping * step) for speed, damping in resonances for step in (spread if damping else (0.0,))]
     return _distinct([*speeds, *(speed for speed in beside if speeds[0] <= speed <= speeds[-1])])
 
 

@@ -44,16 +44,6 @@ from shaftwork.torsional.order_excitations import (
     without_swing,
 )
 
-SPREAD = (0.0, -0.5, 0.5, -1.0, 1.0, -2.0, 2.0, -4.0, 4.0)
-"""Speeds beside a resonance, as multiples of its damping ratio: the response falls to 0.7 at 1 and to 0.24 at 4, so
-straight lines between these show a peak as it is."""
-MOST_POINTS = 2000
-"""Linearisations that are kept for further questions at the same speeds: some ten resonances with `SPREAD` about each,
-and what a user gives, are some hundred."""
-COARSE = 41
-"""Speeds at which a diagram looks for resonances that move with the speed: frequencies are smooth over it, and between
-two of 41 speeds, 2.5 % of the range apart, their curves are nearly straight."""
-
 
 class Resonance(NamedTuple):
     """A speed at which an order meets a natural frequency.
@@ -153,7 +143,8 @@ class ForcedTrain(StoredByFields):
         if not callable(at):
             always = motions(at, self.t, inputs)
             return lambda _: always
-        points = BoundedCache[float, LinearModel | ExactModel](MOST_POINTS)
+        # Speeds beside some ten resonances, and what a user gives, are some hundred.
+        points = BoundedCache[float, LinearModel | ExactModel](2000)
         if isinstance(at, TurningTrain) and not exact_shafts(self.model.netlist, every=self.exact):
             about = at.near(self.t, inputs)
             return lambda speed: points(speed, lambda: about(speed))
@@ -223,7 +214,8 @@ class ForcedTrain(StoredByFields):
         def modes(speed: float, f_max: float) -> tuple[NaturalModes, str]:
             return self.modes(speed, f_max), self._near(speed).phase
 
-        coarse = np.linspace(speeds[0], speeds[-1], COARSE)
+        # Frequencies are smooth over the speed: between two of 41, 2.5 % of the range apart, they are nearly straight.
+        coarse = np.linspace(speeds[0], speeds[-1], 41)
         return diagram.campbell(self.network.name, modes, coarse, orders, f_max, constant=not callable(self.at))
 
     def _damping(self, speed: float, frequency: float) -> float:

@@ -12,23 +12,23 @@ from numpy.typing import NDArray
 from shaftwork.numerics.tolerances import TYPED
 from shaftwork.results.observer import Array, Complex, blocks
 
-LARGEST_CYCLE = 120
-"""Turns after which a cycle begins again, at most: teeth of 20 and 24 with half orders need so many. Orders that
-need more come into nearly every phase within a run."""
 POINTS = 64
 """Samples of a waveform over a swing of its highest order: between them it leaves its chords by (pi / 64)^2 / 2 of that
 swing, 0.12 %, less than a line in a picture is wide, and Newton's method finds a peak from the nearest of them."""
 
 
-def cycle_of(orders: Sequence[float]) -> int | None:
-    """The turns after which orders begin again together; None where they have no such cycle below 120 turns."""
+def cycle_of(orders: Sequence[float], most: int = 120) -> int | None:
+    """The turns after which orders begin again together; None where they have no such cycle of `most` turns or fewer.
+
+    Teeth of 20 and 24 with half orders need 120. Orders that need more come into nearly every phase within a run.
+    """
     turns = 1
     for order in orders:
-        fraction = Fraction(order).limit_denominator(LARGEST_CYCLE)
+        fraction = Fraction(order).limit_denominator(most)
         if abs(float(fraction) - order) > TYPED * order:
             return None
         turns = math.lcm(turns, fraction.denominator)
-        if turns > LARGEST_CYCLE:
+        if turns > most:
             return None
     return turns
 

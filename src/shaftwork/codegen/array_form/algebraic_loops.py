@@ -26,8 +26,6 @@ from shaftwork.codegen.array_form.matrices import LinearPart
 from shaftwork.core.errors import SimulationError
 from shaftwork.numerics.tolerances import TYPED
 
-ITERATIONS = 50
-"""Newton's steps, and halves of each."""
 ROUNDING = 64 * float(np.finfo(float).eps)
 NEARLY = 1e4 * ROUNDING
 """Residuals and steps up to which they are rounding where no step makes the residual smaller, as parts of the terms."""
@@ -132,7 +130,7 @@ class LoopSolver:
         a = starts.copy()
         residual, size = self.residual(t, x, a)
         going, near = np.ones(len(t), dtype=bool), np.zeros(a.shape, dtype=bool)
-        for _ in range(ITERATIONS):
+        for _ in range(50):  # Newton's steps
             going &= ~(np.abs(residual) <= ROUNDING * size).all(axis=0)
             if not going.any():
                 break
@@ -140,7 +138,7 @@ class LoopSolver:
             step, solves = self._step(t[here], x[:, here], a[:, here], residual[:, here])
             near[:, here] = solves & (np.abs(step) <= NEARLY * np.abs(a[:, here]))
             norm = np.linalg.norm(residual, axis=0)
-            for _ in range(ITERATIONS):
+            for _ in range(50):  # halves of the step
                 trial = a[:, here] + step
                 left, terms = self.residual(t[here], x[:, here], trial)
                 better = np.linalg.norm(left, axis=0) < norm[here]

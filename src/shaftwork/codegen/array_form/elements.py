@@ -26,16 +26,14 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 LINEAR = (Kind.ACROSS_STORE, Kind.THROUGH_STORE, Kind.CONDUCTANCE)
-AT_ONCE = 2_000_000
-"""Numbers of many instants or columns that are made at once, 16 MB."""
 FULL = 16_000
 """Entries up to which a matrix is an array: products of small sparse matrices cost a hundred times as much, and that of
 one with a state takes 2 us before it begins."""
 
 
-def blocks(count: int, width: int) -> Iterator[slice]:
-    """Places 0 to `count` in blocks, of as many as are made at once where each holds `width` numbers; at least one."""
-    size = max(1, AT_ONCE // max(1, width))
+def blocks(count: int, width: int, at_once: int = 2_000_000) -> Iterator[slice]:
+    """Places 0 to `count` in blocks of `at_once` numbers, 16 MB, where each place holds `width`; at least one."""
+    size = max(1, at_once // max(1, width))
     return (slice(first, min(first + size, count)) for first in range(0, max(count, 1), size))
 
 

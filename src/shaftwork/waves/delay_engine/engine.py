@@ -24,10 +24,9 @@ from shaftwork.waves.delay_engine.lines import DelayProblem, DelayTrajectory
 from shaftwork.waves.delay_engine.march import March
 from shaftwork.waves.delay_engine.waveforms import one_sided, trajectory
 
-LONG = 20_000
-"""A motion of more panels after its last breakpoint, and of 100 for each output, is leapt through."""
-MOST_PANELS_FAR = 64
-"""Panels of a period up to which one that is leapt through is made finer."""
+LONG, MOST_PANELS_FAR = 20_000, 64
+"""A motion of more panels than the first after its last breakpoint, and of 100 for each output, is leapt through; its
+period is made finer up to so many panels as the second."""
 
 
 def solve(problem: DelayProblem) -> DelayTrajectory:
