@@ -23,11 +23,12 @@ class Mesh:
     """A shaft as speeds at nodes and torques at stations.
 
     Args:
-        intervals: how many times the unit of all shares goes into the shaft; 1 where its elements are unequal.
+        intervals: how many times the unit of all lengths goes into the shaft; 1 where its elements are unequal: then
+            the unit is the whole shaft.
         nodes: (n,) places of the speeds, from 0 to 1.
-        inertias: (n,) the length whose inertia is at each; they sum to the shaft, less what a closure leaves out.
-        stations: (k,) places of the torques.
-        lengths: (k,) the length whose compliance is that of each; they sum to the shaft.
+        inertias: (n,) the length whose inertia is at each; they sum to `intervals`, less what a closure leaves out.
+        stations: (k,) places of the torques, from 0 to 1.
+        lengths: (k,) the length whose compliance is that of each; they sum to `intervals`.
         weights: for each torque the nodes and factors that its rate of twist is the sum of.
         dampers: (n - 1,) length of the damper between each two neighbouring speeds, where torque k stands at node k;
             empty where a damper stands beside each torque, with its length.

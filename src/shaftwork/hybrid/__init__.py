@@ -4,10 +4,11 @@ How an event is handled:
 
 1. An engine integrates the equations of the modes, `modes.mode_equations`, until one of their guards rises through
    zero: `hybrid_run`, and `integrate.guards` or `codegen.taylor.heyoka` for the instant.
-2. Where that guard by itself leads to other numbers in the same equations, the engine goes on past it at once:
-   `in_place_events`.
-3. Otherwise `event_iteration` makes the transition of the guard that is farthest beyond its limit, `hybrid_state`, and
-   diodes and freewheels take over what it would cut off, `commutation`.
+2. Where the same equations go on with other numbers, heyoka goes on past the guard without a stop: `in_place_events`.
+   Other engines stop at every guard.
+3. Where an engine stops, `event_iteration` makes the transition of the guard that was met, and after it that of the
+   guard that is then farthest beyond its limit, `hybrid_state`; diodes and freewheels take over what a transition would
+   cut off, `commutation`.
 4. All that is stored goes over to the equations of the new modes, `hybrid_transfer` and `codegen.state_transfer`, which
    `equation_sets` makes when a motion first needs them.
 5. Where something rigid closes with a speed, an impact comes first and may throw it back: `impacts.impacts`.

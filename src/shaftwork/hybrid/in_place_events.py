@@ -59,7 +59,7 @@ class InPlaceTransition:
 
 
 class InPlaceEvents:
-    """Lets an engine go on past guards; `Problem.react`.
+    """Lets an engine go on past guards; `Problem.past_guards`.
 
     A change that leaves all other modes as they are is looked up and checked here; the event iteration makes any other.
 

@@ -33,7 +33,8 @@ class EngineEntry:
             takes it for a problem, empty where it does not. `auto` asks these engines about linear problems and about
             large ones, in the order of the table, before it weighs the others.
         asked_beyond: number of states beyond which a problem is large for that.
-        step: about how long one step takes in s, and how much longer for each state; `auto` compares these.
+        step: about how long one step takes in s, and how much longer for each state. `auto` compares those of the
+            engines that `choice.choose` names; of others nobody reads it.
         explicit: whether stability bounds its steps: then no run is so long that the rounding of speeds spoils torques.
         finest: the finest relative tolerance that it is given; 0 where it has no step error.
         loosest: the loosest one that it runs with.

@@ -362,7 +362,8 @@ class Engine(Protocol):
     It is a function of the problem, and `integrate/engines.py` has an entry for it. It ends a step at every breakpoint
     and goes on from `jump`, as well as where a switch changes its sign. It gives up after `max_steps`, never returns a
     state that is not finite, and calls `progress` after its steps. Where its entry has `following` it ends at the first
-    guard that is met. For a method of single steps `stepping.march` does all this.
+    guard that is met. For a method of single steps `stepping.march` does all this. Another loop finds the pieces, their
+    first states, functions that are never asked outside them and dense output of the whole run in `smooth_intervals`.
     """
 
     def __call__(self, problem: Problem) -> Trajectory: ...
