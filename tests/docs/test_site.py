@@ -23,6 +23,8 @@ FENCE = re.compile(r"^```.*?^```$|`[^`\n]+`", re.MULTILINE | re.DOTALL)
 FORMULA = re.compile(r"\$\$.+?\$\$|\$[^$\n]+\$", re.DOTALL)
 PRINTED = re.compile(r"^```latex$.*?^```$", re.MULTILINE | re.DOTALL)
 """LaTeX that an example printed."""
+DRAWN = re.compile(r"<(pre|code|script|math)\b.*?</\1>", re.DOTALL)
+"""What may hold LaTeX: code, and formulas that are drawn."""
 EXTERNAL = re.compile(r"""<(?:script|link|img)[^>]+(?:src|href)=["'](?:https?:)?//""")
 
 MEASURED = """
@@ -66,6 +68,12 @@ def test_the_site_is_built_without_a_warning_and_loads_nothing_from_the_internet
     assert [
         sheet.name for sheet in site.rglob("*.css") if re.search(r"url\([\"']?(https?:)?//", sheet.read_text())
     ] == []
+
+
+def test_no_page_shows_latex_as_it_stands(site: Path) -> None:
+    """Not even a notebook, whose cells show equations without dollars around them."""
+    texts = {page.parent.name: DRAWN.sub("", page.read_text(encoding="utf-8")) for page in site.rglob("*.html")}
+    assert [name for name, text in texts.items() if re.search(r"\\begin\{|\\frac|\$\$", text)] == []
 
 
 @pytest.mark.skipif(CHROMIUM is None and "CI" not in os.environ, reason="needs chromium (Debian package); CI has it")

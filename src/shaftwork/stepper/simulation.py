@@ -124,8 +124,8 @@ class Simulation:
 
     @property
     def modes(self) -> Mapping[str, str]:
-        """The mode of every part that changes its mode; empty where none does."""
-        return dict(self._now.modes)
+        """The mode of every part that changes its mode, in the words of `Solution.phases`; empty where none does."""
+        return dict(self._now.words)
 
     def __getitem__(self, name: str) -> Any:
         """A quantity now, "J2.omega", in SI: after whatever jumps at this instant, with the inputs that are set.
