@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import re
@@ -113,3 +114,11 @@ def test_the_pages_that_a_browser_counts_have_formulas() -> None:
     """Else the counts above could agree at zero."""
     texts = (FENCE.sub("", (ROOT / "docs" / f"{name}.md").read_text()) for name in ("states", "frequency", "names"))
     assert [len(FORMULA.findall(text)) > 10 for text in texts] == [True] * 3
+
+
+def test_words_in_a_formula_may_hold_formulas() -> None:
+    """As in "J$_{2}$ is held at rest"; the converter by itself spells the words as letters."""
+    pytest.importorskip("latex2mathml", reason="needs the extra docs; CI has it")
+    page = importlib.import_module("docs.mathml")
+    drawn = page.on_page_content(r'<span class="arithmatex">\(\omega = 0 \quad \text{(J$_{2}$ is held)}\)</span>')
+    assert re.findall("<mtext>(.*?)</mtext>", drawn.replace("&#x000A0;", " ")) == ["(J", " is held)"]
