@@ -17,6 +17,8 @@ FORMULA = re.compile(r'<(?P<tag>span|div) class="arithmatex">\\[(\[](?P<latex>.*
 """What pymdownx.arithmatex (generic) makes of $...$ and $$...$$."""
 LEFT_OVER = re.compile(r">\s*(?:\\[A-Za-z]*|&|&amp;)\s*<")
 """A command or a separator that the converter did not know, and shows as it stands."""
+TEXT = re.compile(r"\\text\{((?:[^{}]|\{[^{}]*\})*)\}")
+"""Words in a formula; the converter does not read formulas within them, "J$_{2}$"."""
 
 
 PRINTED = re.compile(r"^```latex\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -54,10 +56,15 @@ def on_page_content(content: str, **_: Any) -> str:
 
 
 def _mathml(formula: re.Match[str]) -> str:
-    latex, block = unescape(formula["latex"]).strip(), formula["tag"] == "div"
+    latex, block = TEXT.sub(_apart, unescape(formula["latex"]).strip()), formula["tag"] == "div"
     drawn = convert(latex, display="block" if block else "inline")
     if unknown := LEFT_OVER.search(drawn):
         raise ValueError(
             f"The formula {latex} would show {unknown[0][1:-1]!r} as it stands. Write it in other commands."
         )
     return f'<div class="formula">{drawn}</div>' if block else drawn
+
+
+def _apart(text: re.Match[str]) -> str:
+    pieces = enumerate(text[1].split("$"))
+    return "".join(f"{{}}{piece}" if number % 2 else f"\\text{{{piece}}}" for number, piece in pieces if piece)

@@ -26,6 +26,8 @@ OTHER = re.compile(r"\]\(([\w-]+)\.ipynb\)")
 """A link from one notebook to another."""
 STYLE = re.compile(r"<style scoped>.*?</style>", re.DOTALL)
 """What pandas puts before every table."""
+ALIGNED = re.compile(r"^\\begin\{align\*\}.*?\\end\{align\*\}$", re.MULTILINE | re.DOTALL)
+"""Equations that a cell shows, which Markdown takes for text unless they stand between dollars."""
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
@@ -42,7 +44,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     for path, notebook in zip(paths, notebooks, strict=True):
         resources = {"output_files_dir": f"{path.stem}-figures", "unique_key": path.stem}
         page, resources = exporter.from_notebook_node(notebook, resources)
-        page = OTHER.sub(r"](\1.md)", STYLE.sub("", page))
+        page = ALIGNED.sub(r"\n$$\n\g<0>\n$$\n", OTHER.sub(r"](\1.md)", STYLE.sub("", page)))
         files.append(File.generated(config, f"notebooks/{path.stem}.md", content=page))
         for name, content in resources["outputs"].items():
             files.append(File.generated(config, f"notebooks/{name}", content=content))
@@ -56,7 +58,7 @@ async def _execute(notebooks: list[nbformat.NotebookNode]) -> None:
     async def execute(notebook: nbformat.NotebookNode) -> None:
         async with free:
             resources = {"metadata": {"path": str(NOTEBOOKS)}}
-            client = NotebookClient(notebook, timeout=SECONDS_PER_CELL, kernel_name="python3", resources=resources)
+            client = NotebookClient(notebook, timeout=SECONDS_PER_CELL, coalesce_streams=True, resources=resources)
             await client.async_execute()
 
     await asyncio.gather(*(execute(notebook) for notebook in notebooks))

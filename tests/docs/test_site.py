@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import re
@@ -23,6 +24,8 @@ FENCE = re.compile(r"^```.*?^```$|`[^`\n]+`", re.MULTILINE | re.DOTALL)
 FORMULA = re.compile(r"\$\$.+?\$\$|\$[^$\n]+\$", re.DOTALL)
 PRINTED = re.compile(r"^```latex$.*?^```$", re.MULTILINE | re.DOTALL)
 """LaTeX that an example printed."""
+DRAWN = re.compile(r"<(pre|code|script|math)\b.*?</\1>", re.DOTALL)
+"""What may hold LaTeX: code, and formulas that are drawn."""
 EXTERNAL = re.compile(r"""<(?:script|link|img)[^>]+(?:src|href)=["'](?:https?:)?//""")
 
 MEASURED = """
@@ -68,6 +71,12 @@ def test_the_site_is_built_without_a_warning_and_loads_nothing_from_the_internet
     ] == []
 
 
+def test_no_page_shows_latex_as_it_stands(site: Path) -> None:
+    """Not even a notebook, whose cells show equations without dollars around them."""
+    texts = {page.parent.name: DRAWN.sub("", page.read_text(encoding="utf-8")) for page in site.rglob("*.html")}
+    assert [name for name, text in texts.items() if re.search(r"\\begin\{|\\frac|\$\$", text)] == []
+
+
 @pytest.mark.skipif(CHROMIUM is None and "CI" not in os.environ, reason="needs chromium (Debian package); CI has it")
 @pytest.mark.parametrize("name", ["states", "frequency", "names", "command-line", "components", "tutorial"])
 def test_a_browser_without_network_draws_every_formula_and_cuts_nothing_off(
@@ -105,3 +114,11 @@ def test_the_pages_that_a_browser_counts_have_formulas() -> None:
     """Else the counts above could agree at zero."""
     texts = (FENCE.sub("", (ROOT / "docs" / f"{name}.md").read_text()) for name in ("states", "frequency", "names"))
     assert [len(FORMULA.findall(text)) > 10 for text in texts] == [True] * 3
+
+
+def test_words_in_a_formula_may_hold_formulas() -> None:
+    """As in "J$_{2}$ is held at rest"; the converter by itself spells the words as letters."""
+    pytest.importorskip("latex2mathml", reason="needs the extra docs; CI has it")
+    page = importlib.import_module("docs.mathml")
+    drawn = page.on_page_content(r'<span class="arithmatex">\(\omega = 0 \quad \text{(J$_{2}$ is held)}\)</span>')
+    assert re.findall("<mtext>(.*?)</mtext>", drawn.replace("&#x000A0;", " ")) == ["(J", " is held)"]

@@ -237,7 +237,7 @@ def test_modes_are_those_of_now() -> None:
     assert run.modes == {"load": "stuck"}
     run.set("motor.tau", 30.0)
     course(run, (), 10, 0.1)
-    assert run.modes == {"load": "forward"}
+    assert run.modes == {"load": "slipping forward"}
 
 
 def test_a_stepped_motion_goes_on_from_another_one() -> None:

@@ -93,8 +93,8 @@ class BucketWheelLoad(Component):
     from zero, and f = sin(psi) up to pi/2, then (alpha - psi) / (alpha - pi/2), and zero from alpha on.
     k_j = max(0, k_1 + sigma nu_j) is drawn for each pass from the soil's normal distribution. So the torque is a
     function of the angle and the seed, and continuous. From `t_on` on the wheel digs, to its full depth after `rise`.
-    The soil in the buckets is left out, as there. At rest it holds nothing: a wheel that is pushed in the soil creeps,
-    at a speed below omega_s where the law balances the push.
+    The weight of the soil in the buckets is left out, as in the source. The load does not stick: a wheel that is pushed
+    in the soil creeps, at a speed below omega_s where the law balances the push.
     Source: Marinkovic 2012, (9)-(11), algorithm of 6 steps, table 1.
     """
 

@@ -123,11 +123,11 @@ class Backlash(ContactPart):
     """A gap between two nodes, with the stiffness and damping of the flanks that close it: teeth, claws, splines.
 
     Law: tau = max(0, c (phi - gap/2) + d omega) where phi > gap/2, min(0, c (phi + gap/2) + d omega) where
-    phi < -gap/2, and 0 between, with phi the twist and omega the speed of node a against node b. A contact never
-    pulls: flanks that part faster than they spring back have let go. Beyond gap/2 by x they store c x^2 / 2; what d
-    takes is lost, and what they have not given back when they let go. Without c the flanks are rigid, and the speed
-    omega with which they meet comes back as -restitution omega; `Network(impacts=...)` says what those do that touch
-    while others are hit. Contact on one side only is a `HardStop` between two nodes. Modes: open, in contact, in
+    phi < -gap/2, and 0 between, with phi the twist and omega the speed of node a against node b. A contact never pulls:
+    flanks that part faster than they spring back are open. Pressed in by x beyond gap/2 they store c x^2 / 2. Energy
+    that d takes is lost, and so is what is still stored when they open. Without c the flanks are rigid, and the speed
+    omega with which they meet comes back as -restitution omega; `Network(impacts=...)` says how an impact passes on to
+    flanks that touch elsewhere. Contact on one side only is a `HardStop` between two nodes. Modes: open, in contact, in
     contact backward. Source: Marinkovic 2012, (12)-(16); restitution: Newton; energy: Willems 1972.
     """
 
@@ -145,8 +145,8 @@ class Backlash(ContactPart):
 class TranslationalBacklash(ContactPart):
     """A gap between two nodes that move along a line: couplings of wagons, claws and pins with play.
 
-    Law: that of a `Backlash`, with the force f, the way s and the speed v of node a against node b in place of torque,
-    twist and speed. Modes: open, in contact, in contact backward. Source: as of a `Backlash`.
+    Law: that of a `Backlash`, with the force f, the displacement s and the speed v of node a against node b in place of
+    torque, twist and speed. Modes: open, in contact, in contact backward. Source: as of a `Backlash`.
     """
 
     gap: float = parameter("m", "whole free way", at_least=0, latex=r"\Delta")
@@ -167,10 +167,10 @@ class TranslationalBacklash(ContactPart):
 class Rope(ContactPart):
     """A massless rope, chain or belt between two nodes: it pulls, and hangs slack instead of pushing.
 
-    Law: f = max(0, c s + d v) where s > 0, and 0 else, with s the way and v the speed of node a against node b: s is
-    the stretch, negative where the rope hangs slack, and 0 at the start unless it is given. It is a `Backlash` without
-    a gap on one side alone: the damper acts while the rope is stretched, and never pushes. A stretched rope stores
-    c s^2 / 2. Modes: slack, taut.
+    Law: f = max(0, c s + d v) where s > 0, and 0 else, with s the displacement and v the speed of node a against node
+    b: s is the stretch, negative where the rope hangs slack, and 0 at the start unless it is given. It is a `Backlash`
+    without a gap on one side alone: the damper acts while the rope is stretched, and never pushes. A stretched rope
+    stores c s^2 / 2. Modes: slack, taut.
     """
 
     c: float = parameter("N/m", "stiffness", above=0)

@@ -257,10 +257,10 @@ class StateSpaceController(Controller):
     the next instant: the first is the start of the motion where that is a multiple of T. So a gain K of LQR, u = -K y,
     is D = K, and a PI controller has A = 0, B = 1, C = k_i, D = k_p.
 
-    It measures speeds and voltages of parts and nodes, and what springs and inductors let through: `shaft.tau_c`. An
-    angle is a speed that a state integrates. Each output goes to a node of its own, as a torque, force, current or
-    voltage. It has no limits: a `SpeedController` has some, with anti-windup. What its states hold is no energy of the
-    drive. Analogue: a controlled current or voltage source. Source: Åström 2008, chapters 6 and 7.
+    It measures speeds and voltages of parts and nodes, and what springs and inductors let through: `shaft.tau_c`. To
+    measure an angle, let a state integrate the speed. Each output goes to a node of its own, as a torque, force,
+    current or voltage. It has no output limits; a `SpeedController` has them, with anti-windup. Its states hold no
+    energy of the drive. Analogue: a controlled current or voltage source. Source: Åström 2008, chapters 6 and 7.
     """
 
     A: Any = parameter("1", "states by states; none", record=Gains, default=None)

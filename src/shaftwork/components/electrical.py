@@ -141,9 +141,9 @@ class Switch(Component):
 
     Law: u = 0 while closed, i = 0 while open. It closes at t_on; with `on`, a law of time alone, it is closed while
     that is above zero, from t_on on; with one that reads u, from when that rises above zero. It opens for good at
-    t_off, which must be later than t_on. Modes: open, closed. A current that an inductance drives and that finds no
-    other way is cut off at once, with its energy lost in the switch; a diode, or a switch that closes at the same
-    instant, lets it flow on.
+    t_off, which must be later than t_on. Modes: open, closed. A current of an inductance that has no other path is cut
+    off at once, with its energy lost in the switch; a diode, or a switch that closes at the same instant, lets it flow
+    on.
     """
 
     t_on: float = parameter("s", "time at which it closes", default=0.0, latex=r"t_{on}")

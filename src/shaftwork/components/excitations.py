@@ -21,9 +21,9 @@ class HarmonicTorque(Component):
 
     Law: tau = mean + scale sum_k T_k cos(k (phi - alpha) + psi_k), positive raises the speed of a, with phi the angle
     of a relative to b and T, psi the harmonics. A cylinder of an engine is one, with its firing angle alpha; so is a
-    propeller. A simulation reads the angle as it swings. Linear analyses have it at one angle, which `modes` and
-    `campbell` warn of; `torsional_calculation` takes the mean for the train, and the swing, at the angle of a shaft
-    that turns steadily, as its excitation. Analogue: a current source.
+    propeller. A simulation reads the angle as it swings. Linear analyses take it at one angle, and `modes` and
+    `campbell` warn of that. `torsional_calculation` takes the mean for the operating point, and the swing at the angle
+    of a steadily turning shaft as the excitation. Analogue: a current source.
     """
 
     harmonics: Harmonics = parameter("1", "orders with amplitudes and phases", record=Harmonics)

@@ -129,11 +129,11 @@ class Brake(Component):
     """A brake between a node and the frame, or between two nodes: it slips against the motion, then holds.
 
     Law: on from t_on, or with `on` from when that rises above zero after t_on, to t_off. While slipping the torque is
-    sign(omega) tau, with tau constant; rising along a straight line over t_rise; or as
-    tau (1 - exp(-(t - t_on) / t_lag)). While locked omega = 0 exactly, and the torque is whatever holds, up to tau in
-    size. Any other course of tau is a law of time, speed or angle; where it falls below zero the torque is zero,
-    max(0, tau), since what rubs cannot drive. A brake whose tau is zero is called slipping all the same: one that opens
-    and closes again is two, one up to t_off and one from t_on, each released while it is off.
+    sign(omega) tau, with tau constant; rising along a straight line over t_rise; or as tau
+    (1 - exp(-(t - t_on) / t_lag)). While locked omega = 0 exactly, and the torque is whatever holds, up to tau in size.
+    Any other course of tau is a law of time, speed or angle; where it falls below zero the torque is zero, max(0, tau),
+    since what rubs cannot drive. A brake whose tau is zero still counts as slipping. Model a brake that opens and
+    closes again as two, one up to t_off and one from t_on, each released while it is off.
     Modes: released, slipping forward or backward, locked. Source: Marinkovic 2012, (4)-(6).
     """
 

@@ -157,12 +157,12 @@ class Hoist(Resistance):
     """A load that hangs on the rope of a drum, behind a gear: it pulls downwards whichever way it moves.
 
     Law: torque on the node -tau_h / efficiency while it is hoisted, -efficiency tau_h while it is lowered, and whatever
-    holds between the two at rest, with tau_h = m g radius / ratio: the weight always, and besides a friction against
-    the motion, which takes (1 / efficiency - 1) tau_h upwards and (1 - efficiency) tau_h downwards. With omega_s it is
-    -tau_h efficiency^(-tanh(omega / omega_s)). A positive speed hoists. A locked brake before it in the network holds
-    tau_h, one behind it efficiency tau_h. The friction alone is lost; the weight's work is supplied, and negative while
-    it is hoisted. The efficiency holds for the weight; that of accelerating the load is left out, and its mass is no
-    part of it: give the node an Inertia of m (radius / ratio)^2.
+    holds between the two at rest, with tau_h = m g radius / ratio. That is the weight, and a friction against the
+    motion of (1 / efficiency - 1) tau_h upwards and (1 - efficiency) tau_h downwards. With omega_s it is -tau_h
+    efficiency^(-tanh(omega / omega_s)). A positive speed hoists. A locked brake before it in the network holds tau_h,
+    one behind it efficiency tau_h. The friction alone is lost; the weight's work is supplied, and negative while it is
+    hoisted. The efficiency applies to the weight, and not to the acceleration of the load. The mass is not included:
+    give the node an Inertia of m (radius / ratio)^2.
     """
 
     m: float = parameter("kg", "mass of the load and its tackle", at_least=0)

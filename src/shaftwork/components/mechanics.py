@@ -32,9 +32,9 @@ class Inertia(Component):
     """A rigid rotating mass: rotor, disc, flywheel; or an arm or mechanism whose inertia changes.
 
     Law: tau = J d(omega)/dt. Of a law J(phi, t), tau = d(J omega)/dt - J_phi omega^2 / 2, with phi the angle of its
-    node from the start, or from `name.phi` among the start values: the momentum is J omega and the energy
-    J omega^2 / 2, of which what moves the masses takes J_t omega^2 / 2, counted as lost, or gives it where that is
-    negative. J is above zero at all times and does not jump. Analogue: a capacitor J to the reference.
+    node from the start, or from `name.phi` among the start values: the momentum is J omega and the energy J
+    omega^2 / 2. The mechanism that changes J over time takes the power J_t omega^2 / 2, counted as lost, or gives it
+    where that is negative. J must stay above zero and must not jump. Analogue: a capacitor J to the reference.
     Source: Popenda 2019, (1)-(3); of a law: Lagrange's equation.
     """
 
@@ -50,9 +50,10 @@ class Inertia(Component):
 class Spring(Component):
     """A massless shaft between two nodes: torsional stiffness with internal damping beside it.
 
-    Law: tau = tau_c + d omega_rel, d(tau_c)/dt = c omega_rel, with tau the torque that node a gives to node b. Of a
-    law c(phi, t), tau = c phi + d omega_rel, with phi the twist of a against b: it stores the integral of c phi over
-    the twist; what a change over time gives or takes counts as lost. Analogue: an inductor 1/c beside a conductance d.
+    Law: tau = tau_c + d omega_rel, d(tau_c)/dt = c omega_rel, with tau the torque that node a gives to node b. Of a law
+    c(phi, t), tau = c phi + d omega_rel, with phi the twist of a against b: it stores the integral of c phi over the
+    twist; energy that a change over time gives or takes counts as lost. Analogue: an inductor 1/c beside a conductance
+    d.
     Source: Popenda 2019, (2), (4); Marinkovic 2012, (14), (17).
     """
 
@@ -134,14 +135,14 @@ class LossyGear(Component):
     Law: omega_a = ratio omega_b. While a drives, tau_b = -ratio efficiency tau_a; while b drives,
     tau_a = -efficiency_back tau_b / ratio. At rest both are held as long as neither side overcomes the loss: it starts
     where efficiency tau_a + tau_b / ratio and tau_a + efficiency_back tau_b / ratio have the same sign, with the
-    torques that the held nodes give to it. An efficiency_back of zero or less locks the gear: b alone cannot turn it,
-    and a must drive along so that it turns the way b pushes. Modes: driving, driven (each forward, where omega_a > 0,
-    or backward), stuck.
+    torques that the held nodes give to it. An efficiency_back of zero or less makes the gear self-locking: b alone
+    cannot turn it, and a must drive too before it turns in the direction of b. Modes: driving, driven
+    (each forward, where omega_a > 0, or backward), stuck.
 
     A self-locking gear that would have to brake more inertia than there is on the side of a has no motion with b
-    driving: it stops at once. Behind a bare spring, with no inertia at node a, it would stop and start without end;
-    a run refuses that. A rigid impact turns the gear as torques would, on, to rest and round, and what the gear loses
-    then is its own.
+    driving: it stops at once. Behind a bare spring, with no inertia at node a, it would stop and start without end; a
+    run refuses that. A rigid impact acts on the gear as torques do: it may go on, stop or reverse. The energy lost in
+    it is counted as the gear's.
     Analogue: a transformer with different ratios of voltages and currents. Source: Pelchen, Schweiger and Otter 2002.
     """
 

@@ -77,7 +77,7 @@ class SpeedController(Component):
     tau_i; without tau_max there are no limits. Before t_on and from t_off on there is no torque, and tau_i rests.
 
     So the controller is a damper k_p and a spring k_p / t_i to a shaft that turns at the reference speed, and tau_i is
-    the torque of that spring; its energy is no energy of the drive, and no balance counts it.
+    the torque of that spring. Its energy is not energy of the drive, and no balance counts it.
     Analogue: a controlled current source. Source: Åström 2006, section 3.5.
     """
 

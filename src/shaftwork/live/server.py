@@ -58,7 +58,9 @@ def serve(
         port: by default a free one.
         browser: whether to open the page.
         say: prints a line.
-        t_end, signals, initial: end of the motion in s, quantities to draw and start values, as of `Session`.
+        t_end: end of the motion, s.
+        signals: quantities to draw, as of `Session`.
+        initial: start values, as of `Session`.
 
     Raises:
         ParameterError: the port is taken, or none.

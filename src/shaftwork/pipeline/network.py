@@ -112,12 +112,10 @@ class Network(ExportedNetwork):
         Args:
             expand: of the network with its shafts written out part by part.
             phase: a phase of the motion, as for `equations`.
-            width: of the drawing, pt, with letters of 10 pt. A longer row goes on in the next one, behind the name of
-                the node at the end of both.
 
         Raises:
             NetworkError: the network cannot be assembled; lists every reason.
-            ParameterError: as for `equations`; a width that is not above zero.
+            ParameterError: as for `equations`.
         """
         from shaftwork.lagrange.lagrange import lagrangian
 

@@ -18,7 +18,7 @@ from shaftwork.results.solution import Solution
 class Contents(TypedDict, total=False):
     """What a report can have besides the network and its motion.
 
-    Args:
+    Attributes:
         signals: quantities to draw and to list; by default those of the scene, or the states.
         phases: combinations of modes whose equations are printed; by default those that last longest.
         at: the point about which frequencies are computed, as for `Network.modes`.

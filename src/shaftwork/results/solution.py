@@ -218,7 +218,8 @@ class Solution(StoredMotion):
 
         Args:
             *names: quantities whose curves stand below; by default the first states.
-            start, end: of the span that is shown, s.
+            start: of the span that is shown, s.
+            end: of the span, s.
             seconds: how long it is shown.
 
         Raises:

@@ -63,8 +63,13 @@ class Simulation:
 
     Args:
         model: of the network.
-        t_start, initial, parameters, rtol, atol, engine: as of `Model.simulate`; the absolute tolerance is that of
-            ordinary speeds also where a motion is tiny, as no step is made twice: give `atol` there.
+        t_start: as of `Model.simulate`, as are the next three and `engine`.
+        initial: start values by name, or a motion that goes on.
+        parameters: values by name.
+        rtol: relative tolerance.
+        atol: absolute tolerance. That of ordinary speeds by default, also where a motion is tiny, as no step is made
+            twice: give it there.
+        engine: the integrator.
         inputs: what will be set again and again, "motor.tau": what is a law there is compiled as a number ahead.
 
     Raises:
@@ -119,8 +124,8 @@ class Simulation:
 
     @property
     def modes(self) -> Mapping[str, str]:
-        """The mode of every part that changes its mode; empty where none does."""
-        return dict(self._now.modes)
+        """The mode of every part that changes its mode, in the words of `Solution.phases`; empty where none does."""
+        return dict(self._now.words)
 
     def __getitem__(self, name: str) -> Any:
         """A quantity now, "J2.omega", in SI: after whatever jumps at this instant, with the inputs that are set.

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 class HolzerMass(NamedTuple):
     """A mass in a mode.
 
-    Args:
+    Attributes:
         name: of the inertia.
         amplitude: its angle over that of the measuring mass; below 0 where it swings against it.
         torque: J omega^2 times its angle, with omega = 2 pi frequency, N m for 1 rad at the measuring mass.
@@ -34,7 +34,7 @@ class HolzerMass(NamedTuple):
 class HolzerShaft(NamedTuple):
     """A shaft in a mode.
 
-    Args:
+    Attributes:
         name: of the spring or shaft.
         torque: the largest along it, N m for 1 rad at the measuring mass.
         stress: nominal, Pa for 1 rad there; None where no section is given.
