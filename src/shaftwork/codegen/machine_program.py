@@ -1,66 +1,80 @@
-"""A right-hand side in machine code: what parameters alone tell is worked out once, and so is what stands twice."""
+"""Expressions in machine code: what parameters alone tell is worked out once, and so is what stands twice."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from functools import cached_property
+import operator
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property, reduce
 from typing import Any
 
 import numpy as np
+import sympy
 from numba.core.errors import NumbaError
-from sympy import Basic, Expr, Function, Symbol
+from sympy import Basic, Expr, Symbol
+from sympy.logic.boolalg import ITE, And, BooleanFalse, BooleanTrue, Not, Or
 
 from shaftwork.codegen.array_form.elements import Array
-from shaftwork.codegen.code import FloatPrinter, executed, shared_parts, vectorised_list
+from shaftwork.codegen.code import vectorised_list
 from shaftwork.codegen.looped_source import LoopedSource, Stencil, read_by
-from shaftwork.components.laws import NUMERICAL
+from shaftwork.components.discontinuities import bells, switches
 from shaftwork.components.laws import t as TIME
+from shaftwork.components.noise import HeldNoise
+from shaftwork.components.tables import Interpolation, InterpolationSlope
 from shaftwork.core.errors import CompileError
 from shaftwork.formulation.explicit_rows import Rows
-from shaftwork.numerics.machine_code import held_noise, interpolate, interpolation_slope, machine_rates
+from shaftwork.numerics.machine_code import Body, held_noise, interpolate, interpolation_slope, machine_function
 
-CALLED: dict[str, Any] = {
-    "Interpolation": interpolate,
-    "InterpolationSlope": interpolation_slope,
-    "HeldNoise": held_noise,
+LARGEST_POWER = 32
+"""The largest that is made of products."""
+CALLED: dict[Any, Callable[..., Any]] = {
+    getattr(sympy, name): getattr(math, name)
+    for name in (
+        *("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh"),
+        *("exp", "log", "erf", "erfc", "gamma"),
+    )
+} | {
+    sympy.Mod: operator.mod,
+    HeldNoise: held_noise,
 }
-"""Functions that sympy does not print, by their names there."""
+"""Functions of numbers that are called."""
+TABLES: dict[Any, Callable[..., Any]] = {Interpolation: interpolate, InterpolationSlope: interpolation_slope}
+RECIPROCALS: dict[Any, Callable[..., Any]] = {
+    **{sympy.sec: math.cos, sympy.csc: math.sin, sympy.cot: math.tan},
+    **{sympy.sech: math.cosh, sympy.csch: math.sinh, sympy.coth: math.tanh},
+}
+INTRINSIC: dict[Any, str] = {sympy.Abs: "fabs", sympy.floor: "floor", sympy.ceiling: "ceil"}
+COMPARED: dict[Any, str] = {
+    **{sympy.StrictGreaterThan: ">", sympy.GreaterThan: ">=", sympy.StrictLessThan: "<", sympy.LessThan: "<="},
+    sympy.Equality: "==",
+}
 
 
 class MachineProgram:
-    """The right-hand side of explicit rows, compiled by numba.
+    """The right-hand side of explicit rows, and what is watched in its motion, compiled by numba.
 
     Args:
         rows: the explicit state equations.
         title: of the network, for messages.
+        guards: expressions in states, parameters and time.
 
     Raises:
         CompileError: a law has no machine code.
     """
 
-    def __init__(self, rows: Rows, title: str) -> None:
-        stencils, constants = LoopedSource(rows, title).stencils
-        used = {str(function.func) for stencil in stencils for function in stencil.rate.atoms(Function)}
-        if without := sorted(used & NUMERICAL.keys() - CALLED.keys()):
-            raise CompileError(f"'{title}' has a law with {', '.join(without)}, of which there is no machine code.")
-        count = len(rows.parameters)
-        self._parameters, self._constants = rows.parameters, tuple(constants.values())
-        self._names: dict[Basic, str] = {TIME: "t"}
-        self._names |= {symbol: f"p[{k}]" for k, symbol in enumerate(rows.parameters)}
-        self._names |= {symbol: f"p[{count + k}]" for k, symbol in enumerate(constants)}
-        self._tables: dict[str, Any] = {}
-        body = [*self._lines([stencil for stencil in stencils if stencil.count == 1])]
-        for stencil in stencils:
-            body += self._loop(stencil) if stencil.count > 1 else ()
-        self.source = "\n".join(("def rhs(t, x, p, rates):", *(f"    {line}" for line in body or ["return"]), ""))
-        """The code."""
-        names = {**vars(math), **{function.__name__: function for function in CALLED.values()}, **self._tables}
+    def __init__(self, rows: Rows, title: str, guards: Sequence[Expr] = ()) -> None:
+        self._rows, (self._stencils, constants) = rows, LoopedSource(rows, title).stencils
+        self._constants, count = tuple(constants.values()), len(rows.parameters)
+        self._places = {symbol: k for k, symbol in enumerate(rows.parameters)}
+        self._places |= {symbol: count + k for k, symbol in enumerate(constants)}
+        jumping = _switches(rows)
+        self._watched = (*guards, *jumping)
         try:
-            self.rates = machine_rates(executed(self.source, "rhs", names, names))
-            """(t, x (n,), p, dx (n,)) writes dx, for the parameters that `values` gives."""
+            functions = machine_function(self._write_rates), machine_function(self._write_watched)
         except NumbaError as error:
             raise CompileError(f"'{title}' has a law that numba cannot compile: {error}") from error
+        self.code = (*functions, len(guards), len(jumping))
+        """As `integrate.problem.MachineRates` has it, for the parameters that `values` gives."""
 
     def values(self, p: Array) -> Array:
         """The parameters of the code from those of the model."""
@@ -69,56 +83,163 @@ class MachineProgram:
 
     @cached_property
     def _function(self) -> Any:
-        return vectorised_list(self._parameters, self._constants)
+        return vectorised_list(self._rows.parameters, self._constants)
 
-    def _lines(self, stencils: Sequence[Stencil]) -> list[str]:
-        """The lines of single rows."""
-        rates, names = list[Expr](), dict(self._names)
-        for stencil in stencils:
-            places = {symbol: stencil.first + distance for symbol, distance in read_by(stencil.rate)}
-            states = {symbol: Symbol(f"x[{place}]", real=True) for symbol, place in places.items()}
-            names |= {state: state.name for state in states.values()}
-            rates.append(stencil.rate.xreplace(states))
-        printer = _MachinePrinter(names, self._tables)
-        lines = [f"{name} = {code}" for name, code in shared_parts(printer, rates).items()]
-        printed = (printer.doprint(rate) for rate in rates)
-        return lines + [f"rates[{stencil.first}] = {rate}" for stencil, rate in zip(stencils, printed, strict=True)]
+    def _write_rates(self, body: Body) -> None:
+        single = _Terms(body, self._places)
+        for stencil in self._stencils:
+            if stencil.count == 1:
+                states = {symbol: _state(stencil.first + distance) for symbol, distance in read_by(stencil.rate)}
+                body.write(stencil.first, single.value(stencil.rate.xreplace(states)))
+        for stencil in self._stencils:
+            if stencil.count > 1:
+                self._write_loop(body, stencil)
 
-    def _loop(self, stencil: Stencil) -> list[str]:
-        """The lines of equal rows; indices that cannot be negative are what LLVM makes vectors of."""
-        first, last, reads = stencil.first, stencil.first + stencil.count, read_by(stencil.rate)
-        names = {symbol: f"x{k}[i]" for k, (symbol, _) in enumerate(reads)}
-        rate = _MachinePrinter({**self._names, **names}, self._tables).doprint(stencil.rate)
-        views = [f"x{k} = x[{first + distance}:{last + distance}]" for k, (_, distance) in enumerate(reads)]
-        return [*views, f"part = rates[{first}:{last}]", f"for i in range({stencil.count}):", f"    part[i] = {rate}"]
+    def _write_loop(self, body: Body, stencil: Stencil) -> None:
+        terms, reads = _Terms(body, self._places), read_by(stencil.rate)
+        for symbol in stencil.rate.free_symbols.difference(symbol for symbol, _ in reads):
+            terms.value(symbol)  # before the loop
+        with body.loop(stencil.first, stencil.first + stencil.count) as row:
+            terms.known |= {symbol: body.read("x", distance, row) for symbol, distance in reads}
+            body.write(0, terms.value(stencil.rate), row)
+
+    def _write_watched(self, body: Body) -> None:
+        states = {symbol: _state(k) for k, symbol in enumerate(self._rows.states)}
+        terms = _Terms(body, self._places)
+        for k, expression in enumerate(self._watched):
+            body.write(k, terms.value(expression.xreplace(states)))
 
 
-class _MachinePrinter(FloatPrinter):
-    """Python code as numba takes it.
+def _state(place: int) -> Symbol:
+    return Symbol(f"x[{place}]", real=True)
+
+
+def _switches(rows: Rows) -> tuple[Expr, ...]:
+    """What makes a rate jump, bend or rise steeply where its sign changes with the motion."""
+    moving = frozenset(rows.states)
+    pairs = (pair for rate in rows.rates for pair in (*switches(rate), *bells(rate, [s for s in rows.states if rate.has(s)])))
+    levels = ((argument, level) for argument, levels in pairs for level in levels if moving & argument.free_symbols)
+    return tuple(argument - level if level else argument for argument, level in dict.fromkeys(levels))
+
+
+class _Terms:
+    """Writes expressions as machine code, equal ones once.
 
     Args:
-        names: of symbols.
-        tables: arrays by their names in the code, to which those of tables are added.
+        body: where it writes.
+        places: of parameters.
     """
 
-    def __init__(self, names: dict[Basic, str], tables: dict[str, Any]) -> None:
-        super().__init__(names)
-        self._tables = tables
+    def __init__(self, body: Body, places: Mapping[Basic, int]) -> None:
+        self._body, self._build, self._places = body, body.builder, places
+        self.known: dict[Basic, Any] = {TIME: body.t}
+        """What is written by what it is of."""
 
-    def _print_Interpolation(self, function: Expr) -> str:
-        return f"interpolate({self._of_table(function)})"
+    def value(self, node: Basic) -> Any:
+        """A number.
 
-    def _print_InterpolationSlope(self, function: Expr) -> str:
-        return f"interpolation_slope({self._of_table(function)})"
+        Raises:
+            CompileError: it has no machine code.
+        """
+        if node not in self.known:
+            self.known[node] = self._number(node)
+        return self.known[node]
 
-    def _print_HeldNoise(self, function: Expr) -> str:
-        return f"held_noise({', '.join(self._print(argument) for argument in function.args)})"
+    def _number(self, node: Any) -> Any:
+        kind, body, build = node.func, self._body, self._build
+        if isinstance(node, Symbol):
+            return self._load(node)
+        if isinstance(node, sympy.Number | sympy.NumberSymbol):
+            return body.number(float(node))
+        if kind is sympy.Add:
+            return reduce(build.fadd, map(self.value, node.args))
+        if kind is sympy.Mul:
+            return self._product(node)
+        if kind is sympy.Pow:
+            return self._power(node.base, node.exp)
+        if kind in CALLED:
+            return body.call(CALLED[kind], *map(self.value, node.args))
+        if kind in RECIPROCALS:
+            return build.fdiv(body.number(1.0), body.call(RECIPROCALS[kind], *map(self.value, node.args)))
+        if kind in INTRINSIC:
+            return body.intrinsic(INTRINSIC[kind], self.value(node.args[0]))
+        if kind in TABLES:
+            return body.call(TABLES[kind], self.value(node.argument), *map(body.array, (node.xs, node.ys)))
+        if kind in (sympy.Max, sympy.Min):
+            return reduce(self._larger if kind is sympy.Max else self._smaller, map(self.value, node.args))
+        if kind in (sympy.sign, sympy.Heaviside):
+            return self._step(node)
+        if kind is sympy.Piecewise:
+            rest = body.number(math.nan)
+            for value, condition in reversed(node.args):
+                rest = build.select(self._condition(condition), self.value(value), rest)
+            return rest
+        raise CompileError(f"There is no machine code of {kind.__name__} in {node}.")
 
-    def _of_table(self, function: Any) -> str:
-        data, names = (function.xs, function.ys), []
-        for values in data:
-            equal = (name for name, array in self._tables.items() if np.array_equal(array, values))
-            name = next(equal, f"table{len(self._tables)}")
-            self._tables[name] = np.array(values, dtype=float)
-            names.append(name)
-        return f"{self._print(function.argument)}, {', '.join(names)}"
+    def _load(self, symbol: Symbol) -> Any:
+        if symbol in self._places:
+            return self._body.read("p", self._places[symbol])
+        if not symbol.name.startswith("x["):
+            raise CompileError(f"'{symbol}' stands in a law and has no value: it is no argument and no parameter.")
+        return self._body.read("x", int(symbol.name[2:-1]))
+
+    def _product(self, node: Expr) -> Any:
+        """A product, with one quotient in place of negative powers."""
+        below = [factor for factor in node.args if factor.is_Pow and factor.exp.is_number and factor.exp.is_negative]
+        above = [self.value(factor) for factor in node.args if factor not in below]
+        top = reduce(self._build.fmul, above) if above else self._body.number(1.0)
+        if not below:
+            return top
+        return self._build.fdiv(top, reduce(self._build.fmul, [self.value(1 / factor) for factor in below]))
+
+    def _power(self, base: Expr, exponent: Expr) -> Any:
+        body, build, value = self._body, self._build, self.value(base)
+        if exponent.is_negative and exponent.is_number:
+            return build.fdiv(body.number(1.0), self.value(sympy.Pow(base, -exponent)))
+        if exponent == sympy.S.Half:
+            return body.intrinsic("sqrt", value)
+        if not exponent.is_Integer or exponent > LARGEST_POWER:
+            return body.call(math.pow, value, self.value(exponent))
+        bits = bin(int(exponent))[3:]  # below the first one
+        result = value
+        for bit in bits:
+            result = build.fmul(result, result)
+            result = build.fmul(result, value) if bit == "1" else result
+        return result
+
+    def _larger(self, one: Any, other: Any) -> Any:
+        return self._one_of(">", one, other)
+
+    def _smaller(self, one: Any, other: Any) -> Any:
+        return self._one_of("<", one, other)
+
+    def _one_of(self, comparison: str, one: Any, other: Any) -> Any:
+        """The first of two numbers where it compares so, the other where it does not; no number where one is none."""
+        build = self._build
+        chosen = build.select(build.fcmp_ordered(comparison, one, other), one, other)
+        return build.select(build.fcmp_unordered("uno", one, other), build.fadd(one, other), chosen)
+
+    def _step(self, node: Expr) -> Any:
+        """A sign or a step: one value above zero, one below, one there."""
+        body, build, argument = self._body, self._build, self.value(node.args[0])
+        sign, zero = node.func is sympy.sign, body.number(0.0)
+        below, at = (body.number(-1.0), zero) if sign else (zero, self.value(node.args[1]))
+        rest = build.select(build.fcmp_ordered("<", argument, zero), below, at)
+        return build.select(build.fcmp_ordered(">", argument, zero), body.number(1.0), rest)
+
+    def _condition(self, node: Any) -> Any:
+        """A condition, as one bit."""
+        build = self._build
+        if isinstance(node, BooleanTrue | BooleanFalse):
+            return self._body.bit(value=bool(node))
+        if isinstance(node, And | Or):
+            return reduce(build.and_ if isinstance(node, And) else build.or_, map(self._condition, node.args))
+        if isinstance(node, Not):
+            return build.not_(self._condition(node.args[0]))
+        if isinstance(node, ITE):
+            return build.select(*map(self._condition, node.args))
+        if node.func is sympy.Unequality:
+            return build.fcmp_unordered("!=", *map(self.value, node.args))
+        if node.func in COMPARED:
+            return build.fcmp_ordered(COMPARED[node.func], *map(self.value, node.args))
+        raise CompileError(f"There is no machine code of the condition {node}.")
