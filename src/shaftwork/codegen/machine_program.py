@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property, reduce
-from typing import Any
+from functools import partial, reduce
+from typing import Any, Literal
 
 import numpy as np
 import sympy
@@ -15,8 +15,8 @@ from sympy import Basic, Expr, Symbol
 from sympy.logic.boolalg import ITE, And, BooleanFalse, BooleanTrue, Not, Or
 
 from shaftwork.codegen.array_form.elements import Array
-from shaftwork.codegen.code import vectorised_list
-from shaftwork.codegen.looped_source import LoopedSource, Stencil, read_by
+from shaftwork.codegen.looped_source import Stencil, read_by, stencils_of
+from shaftwork.codegen.taylor.heyoka_parameters import Fixed
 from shaftwork.components.discontinuities import bells, switches
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.noise import HeldNoise
@@ -25,6 +25,8 @@ from shaftwork.core.errors import CompileError
 from shaftwork.formulation.explicit_rows import Rows
 from shaftwork.numerics.machine_code import Body, held_noise, interpolate, interpolation_slope, machine_function
 
+UNROLLED = 64
+"""So many rows are not searched for equal ones: that takes as long as to compile them."""
 LARGEST_POWER = 32
 """The largest that is made of products."""
 CALLED: dict[Any, Callable[..., Any]] = {
@@ -63,14 +65,29 @@ class MachineProgram:
     """
 
     def __init__(self, rows: Rows, title: str, guards: Sequence[Expr] = ()) -> None:
-        self._rows, (self._stencils, constants) = rows, LoopedSource(rows, title).stencils
-        self._constants, count = tuple(constants.values()), len(rows.parameters)
-        self._places = {symbol: k for k, symbol in enumerate(rows.parameters)}
-        self._places |= {symbol: count + k for k, symbol in enumerate(constants)}
+        places = dict(zip(rows.states, (("x", k) for k in range(len(rows.states))), strict=True))
+        places |= {symbol: ("p", k) for k, symbol in enumerate(rows.parameters)}
+        large = len(rows.states) > UNROLLED
+        loops = [stencil for stencil in stencils_of(rows) if stencil.count > 1] if large else []
+        in_loops = {row for loop in loops for row in range(loop.first, loop.first + loop.count)}
+        single = {row: rate for row, rate in enumerate(rows.rates) if row not in in_loops}
+        reads = {symbol for loop in loops for symbol, _ in read_by(loop.rate)}
         jumping = _switches(rows)
-        self._watched = (*guards, *jumping)
+        watched = dict(enumerate((*guards, *jumping)))
+        expressions = (*single.values(), *(loop.rate for loop in loops), *watched.values())
+        self._fixed = fixed = Fixed(rows.parameters, (*rows.states, *reads, TIME), expressions)
+        places |= {part: ("p", len(rows.parameters) + k) for part, k in fixed.places.items()}
+
+        def write(body: Body, values: Mapping[int, Expr], loops: Sequence[Stencil] = ()) -> None:
+            terms = _Terms(body, fixed, places)
+            for place, value in values.items():
+                body.write(place, terms.value(value))
+            for loop in loops:
+                terms.write_loop(loop)
+
         try:
-            functions = machine_function(self._write_rates), machine_function(self._write_watched)
+            rates = machine_function(partial(write, values=single, loops=loops))
+            functions = rates, machine_function(partial(write, values=watched))
         except NumbaError as error:
             raise CompileError(f"'{title}' has a law that numba cannot compile: {error}") from error
         self.code = (*functions, len(guards), len(jumping))
@@ -78,46 +95,15 @@ class MachineProgram:
 
     def values(self, p: Array) -> Array:
         """The parameters of the code from those of the model."""
-        with np.errstate(all="ignore"):
-            return np.append(p, [float(value) for value in self._function(*p.tolist())])
-
-    @cached_property
-    def _function(self) -> Any:
-        return vectorised_list(self._rows.parameters, self._constants)
-
-    def _write_rates(self, body: Body) -> None:
-        single = _Terms(body, self._places)
-        for stencil in self._stencils:
-            if stencil.count == 1:
-                states = {symbol: _state(stencil.first + distance) for symbol, distance in read_by(stencil.rate)}
-                body.write(stencil.first, single.value(stencil.rate.xreplace(states)))
-        for stencil in self._stencils:
-            if stencil.count > 1:
-                self._write_loop(body, stencil)
-
-    def _write_loop(self, body: Body, stencil: Stencil) -> None:
-        terms, reads = _Terms(body, self._places), read_by(stencil.rate)
-        for symbol in stencil.rate.free_symbols.difference(symbol for symbol, _ in reads):
-            terms.value(symbol)  # before the loop
-        with body.loop(stencil.first, stencil.first + stencil.count) as row:
-            terms.known |= {symbol: body.read("x", distance, row) for symbol, distance in reads}
-            body.write(0, terms.value(stencil.rate), row)
-
-    def _write_watched(self, body: Body) -> None:
-        states = {symbol: _state(k) for k, symbol in enumerate(self._rows.states)}
-        terms = _Terms(body, self._places)
-        for k, expression in enumerate(self._watched):
-            body.write(k, terms.value(expression.xreplace(states)))
-
-
-def _state(place: int) -> Symbol:
-    return Symbol(f"x[{place}]", real=True)
+        return np.concatenate([p, self._fixed.values(p)])
 
 
 def _switches(rows: Rows) -> tuple[Expr, ...]:
     """What makes a rate jump, bend or rise steeply where its sign changes with the motion."""
     moving = frozenset(rows.states)
-    pairs = (pair for rate in rows.rates for pair in (*switches(rate), *bells(rate, [s for s in rows.states if rate.has(s)])))
+    pairs = (
+        pair for rate in rows.rates for pair in (*switches(rate), *bells(rate, [s for s in rows.states if rate.has(s)]))
+    )
     levels = ((argument, level) for argument, levels in pairs for level in levels if moving & argument.free_symbols)
     return tuple(argument - level if level else argument for argument, level in dict.fromkeys(levels))
 
@@ -127,13 +113,24 @@ class _Terms:
 
     Args:
         body: where it writes.
-        places: of parameters.
+        fixed: what parameters alone tell.
+        places: arrays in which states, parameters and what is fixed stand, and where.
     """
 
-    def __init__(self, body: Body, places: Mapping[Basic, int]) -> None:
-        self._body, self._build, self._places = body, body.builder, places
-        self.known: dict[Basic, Any] = {TIME: body.t}
-        """What is written by what it is of."""
+    def __init__(self, body: Body, fixed: Fixed, places: Mapping[Basic, tuple[Literal["x", "p"], int]]) -> None:
+        self._body, self._build, self._fixed, self._places = body, body.builder, fixed, places
+        self._known: dict[Basic, Any] = {TIME: body.t}
+
+    def write_loop(self, loop: Stencil) -> None:
+        """Write equal rows."""
+        for node in sympy.preorder_traversal(loop.rate):
+            if node in self._places:
+                self.value(node)  # before the loop
+        outside, reads = dict(self._known), read_by(loop.rate)
+        with self._body.loop(loop.first, loop.first + loop.count) as row:
+            self._known |= {symbol: self._body.read("x", distance, row) for symbol, distance in reads}
+            self._body.write(0, self.value(loop.rate), row)
+        self._known = outside
 
     def value(self, node: Basic) -> Any:
         """A number.
@@ -141,18 +138,19 @@ class _Terms:
         Raises:
             CompileError: it has no machine code.
         """
-        if node not in self.known:
-            self.known[node] = self._number(node)
-        return self.known[node]
+        if node not in self._known:
+            place = self._places.get(node)
+            self._known[node] = self._number(node) if place is None else self._body.read(*place)
+        return self._known[node]
 
     def _number(self, node: Any) -> Any:
         kind, body, build = node.func, self._body, self._build
         if isinstance(node, Symbol):
-            return self._load(node)
+            raise CompileError(f"'{node}' stands in a law and has no value: it is no argument and no parameter.")
         if isinstance(node, sympy.Number | sympy.NumberSymbol):
             return body.number(float(node))
         if kind is sympy.Add:
-            return reduce(build.fadd, map(self.value, node.args))
+            return reduce(build.fadd, map(self.value, self._fixed.arguments(node)))
         if kind is sympy.Mul:
             return self._product(node)
         if kind is sympy.Pow:
@@ -176,17 +174,13 @@ class _Terms:
             return rest
         raise CompileError(f"There is no machine code of {kind.__name__} in {node}.")
 
-    def _load(self, symbol: Symbol) -> Any:
-        if symbol in self._places:
-            return self._body.read("p", self._places[symbol])
-        if not symbol.name.startswith("x["):
-            raise CompileError(f"'{symbol}' stands in a law and has no value: it is no argument and no parameter.")
-        return self._body.read("x", int(symbol.name[2:-1]))
-
     def _product(self, node: Expr) -> Any:
         """A product, with one quotient in place of negative powers."""
-        below = [factor for factor in node.args if factor.is_Pow and factor.exp.is_number and factor.exp.is_negative]
-        above = [self.value(factor) for factor in node.args if factor not in below]
+        factors, below = self._fixed.arguments(node), list[Expr]()
+        for factor in factors:
+            if factor.is_Pow and factor.exp.is_number and factor.exp.is_negative and factor not in self._places:
+                below.append(factor)
+        above = [self.value(factor) for factor in factors if factor not in below]
         top = reduce(self._build.fmul, above) if above else self._body.number(1.0)
         if not below:
             return top
