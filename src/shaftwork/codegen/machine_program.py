@@ -42,12 +42,19 @@ CALLED: dict[Any, Callable[..., Any]] = {
 """Functions of numbers that are called."""
 TABLES: dict[Any, Callable[..., Any]] = {Interpolation: interpolate, InterpolationSlope: interpolation_slope}
 RECIPROCALS: dict[Any, Callable[..., Any]] = {
-    **{sympy.sec: math.cos, sympy.csc: math.sin, sympy.cot: math.tan},
-    **{sympy.sech: math.cosh, sympy.csch: math.sinh, sympy.coth: math.tanh},
+    sympy.sec: math.cos,
+    sympy.csc: math.sin,
+    sympy.cot: math.tan,
+    sympy.sech: math.cosh,
+    sympy.csch: math.sinh,
+    sympy.coth: math.tanh,
 }
 INTRINSIC: dict[Any, str] = {sympy.Abs: "fabs", sympy.floor: "floor", sympy.ceiling: "ceil"}
 COMPARED: dict[Any, str] = {
-    **{sympy.StrictGreaterThan: ">", sympy.GreaterThan: ">=", sympy.StrictLessThan: "<", sympy.LessThan: "<="},
+    sympy.StrictGreaterThan: ">",
+    sympy.GreaterThan: ">=",
+    sympy.StrictLessThan: "<",
+    sympy.LessThan: "<=",
     sympy.Equality: "==",
 }
 
@@ -87,15 +94,13 @@ class MachineProgram:
 
         try:
             rates = machine_function(partial(write, values=single, loops=loops))
-            functions = rates, machine_function(partial(write, values=watched))
+            self._code = rates, machine_function(partial(write, values=watched)), len(guards), len(jumping)
         except NumbaError as error:
             raise CompileError(f"'{title}' has a law that numba cannot compile: {error}") from error
-        self.code = (*functions, len(guards), len(jumping))
-        """As `integrate.problem.MachineRates` has it, for the parameters that `values` gives."""
 
-    def values(self, p: Array) -> Array:
-        """The parameters of the code from those of the model."""
-        return np.concatenate([p, self._fixed.values(p)])
+    def bind(self, p: Array) -> tuple[Any, Any, int, int, Array]:
+        """The code with its parameters, from those of the model, as `integrate.problem.MachineRates` has them."""
+        return (*self._code, np.concatenate([p, self._fixed.values(p)]))
 
 
 def _switches(rows: Rows) -> tuple[Expr, ...]:
@@ -144,37 +149,28 @@ class _Terms:
         return self._known[node]
 
     def _number(self, node: Any) -> Any:
-        kind, body, build = node.func, self._body, self._build
+        kind, body = node.func, self._body
         if isinstance(node, Symbol):
             raise CompileError(f"'{node}' stands in a law and has no value: it is no argument and no parameter.")
         if isinstance(node, sympy.Number | sympy.NumberSymbol):
             return body.number(float(node))
-        if kind is sympy.Add:
-            return reduce(build.fadd, map(self.value, self._fixed.arguments(node)))
-        if kind is sympy.Mul:
-            return self._product(node)
-        if kind is sympy.Pow:
-            return self._power(node.base, node.exp)
+        if kind in SHAPES:
+            return SHAPES[kind](self, node)
         if kind in CALLED:
             return body.call(CALLED[kind], *map(self.value, node.args))
         if kind in RECIPROCALS:
-            return build.fdiv(body.number(1.0), body.call(RECIPROCALS[kind], *map(self.value, node.args)))
+            return self._build.fdiv(body.number(1.0), body.call(RECIPROCALS[kind], self.value(node.args[0])))
         if kind in INTRINSIC:
             return body.intrinsic(INTRINSIC[kind], self.value(node.args[0]))
         if kind in TABLES:
             return body.call(TABLES[kind], self.value(node.argument), *map(body.array, (node.xs, node.ys)))
-        if kind in (sympy.Max, sympy.Min):
-            return reduce(self._larger if kind is sympy.Max else self._smaller, map(self.value, node.args))
-        if kind in (sympy.sign, sympy.Heaviside):
-            return self._step(node)
-        if kind is sympy.Piecewise:
-            rest = body.number(math.nan)
-            for value, condition in reversed(node.args):
-                rest = build.select(self._condition(condition), self.value(value), rest)
-            return rest
         raise CompileError(f"There is no machine code of {kind.__name__} in {node}.")
 
-    def _product(self, node: Expr) -> Any:
+    def sum(self, node: Expr) -> Any:
+        """A sum."""
+        return reduce(self._build.fadd, map(self.value, self._fixed.arguments(node)))
+
+    def product(self, node: Expr) -> Any:
         """A product, with one quotient in place of negative powers."""
         factors, below = self._fixed.arguments(node), list[Expr]()
         for factor in factors:
@@ -186,40 +182,46 @@ class _Terms:
             return top
         return self._build.fdiv(top, reduce(self._build.fmul, [self.value(1 / factor) for factor in below]))
 
-    def _power(self, base: Expr, exponent: Expr) -> Any:
-        body, build, value = self._body, self._build, self.value(base)
+    def power(self, node: Expr) -> Any:
+        """A power; one of a whole number as products."""
+        (base, exponent), body, build = node.args, self._body, self._build
         if exponent.is_negative and exponent.is_number:
-            return build.fdiv(body.number(1.0), self.value(sympy.Pow(base, -exponent)))
+            return build.fdiv(body.number(1.0), self.value(1 / node))
+        value = self.value(base)
         if exponent == sympy.S.Half:
             return body.intrinsic("sqrt", value)
         if not exponent.is_Integer or exponent > LARGEST_POWER:
             return body.call(math.pow, value, self.value(exponent))
-        bits = bin(int(exponent))[3:]  # below the first one
         result = value
-        for bit in bits:
+        for bit in bin(int(exponent))[3:]:  # below the first one
             result = build.fmul(result, result)
             result = build.fmul(result, value) if bit == "1" else result
         return result
 
-    def _larger(self, one: Any, other: Any) -> Any:
-        return self._one_of(">", one, other)
+    def extreme(self, node: Expr) -> Any:
+        """The largest or smallest of numbers; no number where one is none."""
+        build, comparison = self._build, ">" if node.func is sympy.Max else "<"
 
-    def _smaller(self, one: Any, other: Any) -> Any:
-        return self._one_of("<", one, other)
+        def one_of(one: Any, other: Any) -> Any:
+            chosen = build.select(build.fcmp_ordered(comparison, one, other), one, other)
+            return build.select(build.fcmp_unordered("uno", one, other), build.fadd(one, other), chosen)
 
-    def _one_of(self, comparison: str, one: Any, other: Any) -> Any:
-        """The first of two numbers where it compares so, the other where it does not; no number where one is none."""
-        build = self._build
-        chosen = build.select(build.fcmp_ordered(comparison, one, other), one, other)
-        return build.select(build.fcmp_unordered("uno", one, other), build.fadd(one, other), chosen)
+        return reduce(one_of, map(self.value, node.args))
 
-    def _step(self, node: Expr) -> Any:
+    def step(self, node: Expr) -> Any:
         """A sign or a step: one value above zero, one below, one there."""
         body, build, argument = self._body, self._build, self.value(node.args[0])
         sign, zero = node.func is sympy.sign, body.number(0.0)
         below, at = (body.number(-1.0), zero) if sign else (zero, self.value(node.args[1]))
         rest = build.select(build.fcmp_ordered("<", argument, zero), below, at)
         return build.select(build.fcmp_ordered(">", argument, zero), body.number(1.0), rest)
+
+    def pieces(self, node: Expr) -> Any:
+        """The first of some values whose condition holds; no number where none does."""
+        rest = self._body.number(math.nan)
+        for value, condition in reversed(node.args):
+            rest = self._build.select(self._condition(condition), self.value(value), rest)
+        return rest
 
     def _condition(self, node: Any) -> Any:
         """A condition, as one bit."""
@@ -237,3 +239,16 @@ class _Terms:
         if node.func in COMPARED:
             return build.fcmp_ordered(COMPARED[node.func], *map(self.value, node.args))
         raise CompileError(f"There is no machine code of the condition {node}.")
+
+
+SHAPES: dict[Any, Callable[[_Terms, Any], Any]] = {
+    sympy.Add: _Terms.sum,
+    sympy.Mul: _Terms.product,
+    sympy.Pow: _Terms.power,
+    sympy.Max: _Terms.extreme,
+    sympy.Min: _Terms.extreme,
+    sympy.sign: _Terms.step,
+    sympy.Heaviside: _Terms.step,
+    sympy.Piecewise: _Terms.pieces,
+}
+"""What is written of several instructions."""

@@ -24,6 +24,10 @@ _quantile = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double, ctypes.c_int)(
 )
 
 
+_written: Any = intrinsic
+"""Functions of which this file writes the machine code itself."""
+
+
 class Body:
     """The machine code of a function of `SYSTEM`, as it is written.
 
@@ -89,7 +93,7 @@ def machine_function(write: Callable[[Body], None]) -> Any:
     Numba would take a second for the hundreds of lines of Python that a network is: to find types and to lower them.
     """
 
-    @intrinsic  # type: ignore[untyped-decorator]
+    @_written
     def body(_typing, t, x, p, written):  # type: ignore[no-untyped-def]
         def lowered(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
             write(Body(context, builder, arguments))
@@ -97,10 +101,10 @@ def machine_function(write: Callable[[Body], None]) -> Any:
 
         return types.void(t, x, p, written), lowered
 
-    return cfunc(types.void(*SYSTEM))(lambda t, x, p, written: body(t, x, p, written))
+    return cfunc(types.void(*SYSTEM))(lambda t, x, p, written: body(t, x, p, written))  # noqa: PLW0108 (numba compiles functions)
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_written
 def call_at(_typing, address, t, x, p, written):  # type: ignore[no-untyped-def]
     """Call a function of `SYSTEM` by its address: one in an argument would have its type looked up at each call."""
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.integrate.crossings import FIRST
+from shaftwork.integrate.crossings import FIRST, vertices
 from shaftwork.integrate.explicit.dormand_prince_loops import advance, between, watch
 from shaftwork.integrate.explicit.explicit_runs import MarchedRun, solid
 from shaftwork.integrate.problem import Array, MachineRates, Problem, Trajectory, changed
@@ -20,6 +20,8 @@ from shaftwork.integrate.smooth_intervals import GuardedFunctions, SmoothInterva
 from shaftwork.integrate.stepping import Step, march, with_outputs
 from shaftwork.numerics.zeros import LOOKS
 
+# Where in a step that is not far from a switch the others look.
+LATER = np.sort(np.append(FIRST, LOOKS))
 # Steps in one call: the most, where nothing can be met in them; and at first, doubled while they meet nothing.
 MOST_AHEAD, FIRST_AHEAD = 4096, 8
 
@@ -182,11 +184,13 @@ class _MachineStepper:
         far = ((np.minimum(np.abs(low), np.abs(high)) > 2 * (high - low)) | (low == high)).all(axis=1)
         near = np.flatnonzero(~far)
         if near.size:
-            times = (starts[near, None] + LOOKS * (ends - starts)[near, None]).ravel()
-            inside = self._watched(times, batch(times)).reshape(near.size, LOOKS.size, -1)
+            times = starts[near, None] + LATER * (ends - starts)[near, None]
+            inside = self._watched(times.ravel(), batch(times.ravel())).reshape(*times.shape, -1)
             course = np.concatenate([before[near, None], inside, after[near, None]], axis=1)
-            moves = np.abs(np.diff(course, axis=1)).max(axis=1)
-            far[near] = ((np.abs(course).min(axis=1) > moves) | (moves == 0)).all(axis=1)
+            heights = course * np.sign(before[near, None])
+            _, low = vertices(np.column_stack([starts[near], times, ends[near]]), heights)
+            still = (course == before[near, None]).all(axis=1)
+            far[near] = ((heights > 0).all(axis=1) & ~low.any(axis=1) | still).all(axis=1)
             near = np.flatnonzero(~far)
         return int(near[0]) if near.size else count
 
