@@ -6,6 +6,7 @@ import math
 import operator
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial, reduce
+from itertools import chain
 from typing import Any, Literal
 
 import numpy as np
@@ -17,7 +18,7 @@ from sympy.logic.boolalg import ITE, And, BooleanFalse, BooleanTrue, Not, Or
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.looped_source import Stencil, read_by, stencils_of
 from shaftwork.codegen.taylor.heyoka_parameters import Fixed
-from shaftwork.components.discontinuities import bells, switches
+from shaftwork.components.discontinuities import bells, between_steps, switches_of
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.noise import HeldNoise
 from shaftwork.components.tables import Interpolation, InterpolationSlope
@@ -105,12 +106,18 @@ class MachineProgram:
 
 def _switches(rows: Rows) -> tuple[Expr, ...]:
     """What makes a rate jump, bend or rise steeply where its sign changes with the motion."""
-    moving = frozenset(rows.states)
-    pairs = (
-        pair for rate in rows.rates for pair in (*switches(rate), *bells(rate, [s for s in rows.states if rate.has(s)]))
-    )
-    levels = ((argument, level) for argument, levels in pairs for level in levels if moving & argument.free_symbols)
-    return tuple(argument - level if level else argument for argument, level in dict.fromkeys(levels))
+    moving, levels = frozenset(rows.states), dict[tuple[Expr, float], None]()
+    for rate in rows.rates:
+        nodes = sympy.preorder_traversal(rate)
+        places = [
+            *chain.from_iterable(map(switches_of, nodes)),
+            *bells(rate, [state for state in rows.states if state in rate.free_symbols]),
+        ]
+        for argument, values in places:
+            # one that changes by the steps of its floors alone passes its levels there
+            if moving & argument.free_symbols and (moving | {TIME}) & between_steps(argument):
+                levels |= dict.fromkeys((argument, value) for value in values)
+    return tuple(argument - level if level else argument for argument, level in levels)
 
 
 class _Terms:
