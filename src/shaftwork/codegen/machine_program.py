@@ -111,7 +111,7 @@ def _switches(rows: Rows) -> tuple[Expr, ...]:
         nodes = sympy.preorder_traversal(rate)
         places = [
             *chain.from_iterable(map(switches_of, nodes)),
-            *bells(rate, [state for state in rows.states if state in rate.free_symbols]),
+            *bells(rate, sorted(moving & rate.free_symbols, key=str)),
         ]
         for argument, values in places:
             # one that changes by the steps of its floors alone passes its levels there
