@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 import pytest
 import sympy
@@ -54,6 +55,20 @@ def test_tables_and_noise_have_machine_code() -> None:
     net.add(sw.TorqueSource("motor", tau=5.0), "rotor")
     one, other = (net.simulate(4.0, rtol=1e-10, engine=engine) for engine in ("numba", "scipy"))
     assert np.abs(one["J.omega"] - other["J.omega"]).max() < 1e-8 * other["J.omega"].max()
+
+
+@pytest.mark.parametrize("scene", ["crane", "excavator"])
+def test_machine_code_watches_every_switch_of_the_laws(scene: str) -> None:
+    model, random = getattr(sw.scenes, scene)().compile(), np.random.default_rng(0)
+    _, watched, guards, count, p = model.machine_program.bind(model.defaults)
+    times, states = random.uniform(0.0, 5.0, 40), random.normal(0.0, 50.0, (40, len(model.states)))
+    values, call = np.empty((40, guards + count)), numba.njit(lambda f, t, x, p, y: f(t, x, p, y))
+    for time, x, row in zip(times, states, values, strict=True):
+        call(watched, time, x, p, row)
+    for switch in model.bind().switches(times, states).T:
+        # either sign will do, and rounding is of another order
+        differences = [np.abs(np.abs(column) - np.abs(switch)).max() for column in values.T]
+        assert min(differences) <= 1e-10 * np.abs(switch).max()
 
 
 def test_between_its_steps_the_motion_is_as_exact_as_at_their_ends() -> None:

@@ -84,7 +84,8 @@ def test_machine_code_equals_the_right_hand_side(net: sw.Network, seed: int) -> 
         return
     call = numba.njit(lambda rates, t, x, p, dx: rates(t, x, p, dx))
     rates, right = np.empty_like(x), model.rhs(time, x)
-    call(program.rates, time, x, program.values(model.defaults), rates)
+    code, *_, p = program.bind(model.defaults)
+    call(code, time, x, p, rates)
     terms = np.abs(model.jacobian(time, x).toarray()) @ np.abs(x) + np.abs(model.rhs(time, 0 * x))
     assert (np.abs(rates - right) <= 1e-13 * (terms + np.abs(right) + 1e-12 * terms.max(initial=0.0))).all()
 

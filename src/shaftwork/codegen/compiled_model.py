@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from sympy import Symbol, count_ops, cse
+from sympy import Expr, Symbol, count_ops, cse
 
 from shaftwork.codegen.array_form.arrays import ArrayProgram, BoundArrays
 from shaftwork.codegen.array_form.elements import Array
@@ -356,14 +356,14 @@ class CompiledModel:
         return Cost("array", {"mul": products, "add": products, "law": self.arrays.inputs.size}, entries)
 
 
-def machine_program(rows: Rows | None, title: str) -> Any:
+def machine_program(rows: Rows | None, title: str, guards: Sequence[Expr] = ()) -> Any:
     """The `machine_program.MachineProgram` of rows; None without rows or numba, or where a law has no such code."""
     if rows is None or not rows.states or find_spec("numba") is None:
         return None
     from shaftwork.codegen.machine_program import MachineProgram
 
     try:
-        return MachineProgram(rows, title)
+        return MachineProgram(rows, title, guards)
     except CompileError:
         return None
 

@@ -186,20 +186,7 @@ class Look:
 
     def _denser(self) -> bool:
         """Add the vertices of parabolas through three points of each switch that may reach zero there."""
-        height = self.values * self._sides
-        inner = height[1:-1]
-        middle, columns = np.nonzero((inner > 0) & (inner <= height[:-2]) & (inner <= height[2:]))
-        (ta, tb, tc), (a, b, c) = (
-            (self.times[middle], self.times[middle + 1], self.times[middle + 2]),
-            (height[middle, columns], height[middle + 1, columns], height[middle + 2, columns]),
-        )
-        with np.errstate(all="ignore"):
-            before, after = (b - a) / (tb - ta), (c - b) / (tc - tb)
-            bend = (after - before) / (tc - ta)
-            # slope of the parabola at the middle point
-            slope = (before * (tc - tb) + after * (tb - ta)) / (tc - ta)
-            at, least = tb - slope / (2 * bend), b - slope**2 / (4 * bend)
-        near = (bend > 0) & (ta < at) & (at < tc) & (least < b / 2)
+        at, near = vertices(self.times, self.values * self._sides)
         new = np.setdiff1d(at[near], self.times) if near.any() else np.empty(0)
         if new.size:
             self.add(new)
@@ -226,3 +213,24 @@ class Look:
             return ends[t] if t in ends else self.at(times)[:, column]
 
         return zero(value, low, high, xtol=tolerance)
+
+
+def vertices(times: Array, heights: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Where functions may come to zero between the times at which they are looked at, by parabolas through three.
+
+    Args:
+        times: (..., k) increasing.
+        heights: (..., k, m) of the functions above zero.
+
+    Returns:
+        (..., k - 2, m) the vertices, and whether one is so low.
+    """
+    ta, tb, tc = times[..., :-2, None], times[..., 1:-1, None], times[..., 2:, None]
+    a, b, c = heights[..., :-2, :], heights[..., 1:-1, :], heights[..., 2:, :]
+    with np.errstate(all="ignore"):
+        before, after = (b - a) / (tb - ta), (c - b) / (tc - tb)
+        bend = (after - before) / (tc - ta)
+        # slope of the parabola at the middle point
+        slope = (before * (tc - tb) + after * (tb - ta)) / (tc - ta)
+        at, least = tb - slope / (2 * bend), b - slope**2 / (4 * bend)
+        return at, (b > 0) & (b <= a) & (b <= c) & (bend > 0) & (ta < at) & (at < tc) & (least < b / 2)

@@ -85,10 +85,16 @@ class MachineRates(NamedTuple):
 
     Args:
         rates: compiled by numba: (t, x (n,), p (parameters,), dx (n,)) writes dx.
+        watched: the same, (t, x, p, values (m,)): guards, and behind them switches.
+        guards: how many of these are guards.
+        switches: how many are switches.
         p: (parameters,) their values.
     """
 
     rates: Any
+    watched: Any
+    guards: int
+    switches: int
     p: Array
 
 

@@ -4,24 +4,117 @@ from __future__ import annotations
 
 import ctypes
 import math
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, Literal
 
 import numpy as np
+from llvmlite import ir
 from numba import cfunc, njit, types
-from numba.extending import get_cython_function_address
+from numba.core import cgutils
+from numba.extending import get_cython_function_address, intrinsic
 
 VECTOR, MATRIX = types.Array(types.float64, 1, "C"), types.Array(types.float64, 2, "C")
-RATES = types.void(types.float64, VECTOR, VECTOR, VECTOR)
-"""Signature of a system: t in s, x (n,), p (parameters,) and dx (n,), which it writes."""
+CONSTANT = types.Array(types.float64, 1, "C", readonly=True)
+SYSTEM = (types.float64, VECTOR, VECTOR, VECTOR)
+"""What a system takes: t in s, x (n,), p (parameters,) and an array that it writes."""
 
 _quantile = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double, ctypes.c_int)(
     get_cython_function_address("scipy.special.cython_special", "ndtri")
 )
 
 
-def machine_rates(function: Any) -> Any:
-    """A Python function of `RATES` as machine code that other machine code can call."""
-    return cfunc(RATES, error_model="numpy")(function)
+_written: Any = intrinsic
+"""Functions of which this file writes the machine code itself."""
+
+
+class Body:
+    """The machine code of a function of `SYSTEM`, as it is written.
+
+    Args:
+        context: numba's.
+        builder: llvmlite's; its instructions may be used beside what is here.
+        arguments: of the function.
+    """
+
+    def __init__(self, context: Any, builder: Any, arguments: Sequence[Any]) -> None:
+        self._context, self.builder, self.t = context, builder, arguments[0]
+        data = (context.make_array(VECTOR)(context, builder, value=array).data for array in arguments[1:])
+        self._data = dict(zip(("x", "p", "written"), data, strict=True))
+
+    def number(self, value: float) -> Any:
+        """A number."""
+        return ir.Constant(ir.DoubleType(), value)
+
+    def bit(self, *, value: bool) -> Any:
+        """A condition that is known."""
+        return ir.Constant(ir.IntType(1), value)
+
+    def _place(self, array: str, place: int, row: Any) -> Any:
+        number = ir.Constant(ir.IntType(64), place)
+        return self.builder.gep(self._data[array], [number if row is None else self.builder.add(row, number)])
+
+    def read(self, array: Literal["x", "p"], place: int, row: Any = None) -> Any:
+        """A number of an array, at a place behind the row of a loop if there is one."""
+        return self.builder.load(self._place(array, place, row))
+
+    def write(self, place: int, value: Any, row: Any = None) -> None:
+        """Write a number, at a place behind the row of a loop if there is one."""
+        self.builder.store(value, self._place("written", place, row))
+
+    @contextmanager
+    def loop(self, first: int, last: int) -> Iterator[Any]:
+        """The row of a loop from a first one to one before the last."""
+        start, end = (ir.Constant(ir.IntType(64), row) for row in (first, last))
+        with cgutils.for_range(self.builder, end, start) as loop:
+            yield loop.index
+
+    def array(self, values: Sequence[float]) -> Any:
+        """A constant array."""
+        return self._context.make_constant_array(self.builder, CONSTANT, np.array(values, dtype=float))
+
+    def intrinsic(self, name: str, value: Any) -> Any:
+        """A function that processors have."""
+        return self.builder.call(self.builder.module.declare_intrinsic(f"llvm.{name}", [value.type]), [value])
+
+    def call(self, function: Any, *values: Any) -> Any:
+        """A function of numbers and constant arrays that numba knows."""
+        context, is_number = self._context, [isinstance(value.type, ir.DoubleType) for value in values]
+        arguments = tuple(types.float64 if number else CONSTANT for number in is_number)
+        kind = context.typing_context.resolve_value_type(function)
+        code = context.get_function(kind, kind.get_call_type(context.typing_context, arguments, {}))
+        context.add_linking_libs(getattr(code, "libs", ()))
+        return code(self.builder, values)
+
+
+def machine_function(write: Callable[[Body], None]) -> Any:
+    """A function of `SYSTEM` in machine code, from what writes it.
+
+    Numba would take a second for the hundreds of lines of Python that a network is: to find types and to lower them.
+    """
+
+    @_written
+    def body(_typing, t, x, p, written):  # type: ignore[no-untyped-def]
+        def lowered(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+            write(Body(context, builder, arguments))
+            return context.get_dummy_value()
+
+        return types.void(t, x, p, written), lowered
+
+    return cfunc(types.void(*SYSTEM))(lambda t, x, p, written: body(t, x, p, written))  # noqa: PLW0108 (numba compiles functions)
+
+
+@_written
+def call_at(_typing, address, t, x, p, written):  # type: ignore[no-untyped-def]
+    """Call a function of `SYSTEM` by its address: one in an argument would have its type looked up at each call."""
+
+    def lowered(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        kinds = [context.get_value_type(kind) for kind in signature.args[1:]]
+        function = builder.inttoptr(arguments[0], ir.FunctionType(ir.VoidType(), kinds).as_pointer())
+        builder.call(function, arguments[1:])
+        return context.get_dummy_value()
+
+    return types.void(address, t, x, p, written), lowered
 
 
 @njit(error_model="numpy")

@@ -78,7 +78,7 @@ class Prepared:
     def compiled(self) -> MachineRates | None:
         """The right-hand side in machine code, or None where there is none."""
         program = self.model.machine_program
-        return None if program is None else MachineRates(program.rates, program.values(self.p))
+        return None if program is None else MachineRates(*program.bind(self.p))
 
     @cached_property
     def atol(self) -> Array:

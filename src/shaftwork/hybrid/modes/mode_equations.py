@@ -389,7 +389,7 @@ class ModeEquations:
     def _machine(self, p: Array) -> MachineRates | None:
         """The right-hand side in machine code with its parameters, or None where there is none."""
         program = self.whole.machine_program
-        return None if program is None else MachineRates(program.rates, program.values(np.array(self.values(p))))
+        return None if program is None else MachineRates(*program.bind(np.array(self.values(p))))
 
     @cached_property
     def machine_program(self) -> Any:
@@ -397,4 +397,4 @@ class ModeEquations:
         if (rows := self.rows) is None:
             return None
         states, rates = self._with_clocks(rows)
-        return machine_program(replace(rows, states=states, rates=rates), self.model.name)
+        return machine_program(replace(rows, states=states, rates=rates), self.model.name, self.expressions)

@@ -6,19 +6,22 @@ that meets one are thrown away. Between the ends of its steps it makes them agai
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from shaftwork.core.errors import ParameterError
-from shaftwork.integrate.crossings import FIRST
-from shaftwork.integrate.explicit.dormand_prince_loops import advance, between
+from shaftwork.integrate.crossings import FIRST, vertices
+from shaftwork.integrate.explicit.dormand_prince_loops import advance, between, watch
 from shaftwork.integrate.explicit.explicit_runs import MarchedRun, solid
-from shaftwork.integrate.problem import Array, MachineRates, Problem, Trajectory
+from shaftwork.integrate.problem import Array, MachineRates, Problem, Trajectory, changed
 from shaftwork.integrate.smooth_intervals import GuardedFunctions, SmoothInterval, failure
 from shaftwork.integrate.stepping import Step, march, with_outputs
 from shaftwork.numerics.zeros import LOOKS
 
+# Where in a step that is not far from a switch the others look.
+LATER = np.sort(np.append(FIRST, LOOKS))
 # Steps in one call: the most, where nothing can be met in them; and at first, doubled while they meet nothing.
 MOST_AHEAD, FIRST_AHEAD = 4096, 8
 
@@ -45,8 +48,25 @@ def solve(problem: Problem) -> Trajectory:
         counts = {"rejected": stepper.tried - (whole.steps.size - 1)}
         return MarchedRun(whole, stepper.dense(whole.steps), counts)
 
+    problem = _watching(problem, machine)
     whole = solid(problem, run)
     return with_outputs(problem, whole.march, whole.dense, whole.counts)
+
+
+def _watching(problem: Problem, machine: MachineRates) -> Problem:
+    """The same problem, with guards and switches in machine code."""
+
+    def values(times: Array, states: Array) -> Array:
+        watched = np.empty((times.size, machine.guards + machine.switches))
+        watch(machine.watched.address, machine.p, times, np.ascontiguousarray(states), watched)
+        return watched
+
+    guards, switches = problem.guards, None
+    if guards is not None:
+        guards = replace(guards, values=lambda times, states: values(times, states)[:, : machine.guards])
+    if problem.switches is not None and machine.switches:
+        switches = lambda times, states: values(times, states)[:, machine.guards :]  # noqa: E731
+    return changed(problem, guards=guards, switches=switches)
 
 
 class _Taken(NamedTuple):
@@ -78,7 +98,7 @@ class _MachineDense:
         order = np.argsort(times, kind="stable")
         numbers = np.clip(np.searchsorted(self.steps, times[order], side="right") - 1, 0, len(self._starts) - 1)
         values = np.empty((times.size, self.states.shape[1]))
-        rates, p = self._machine
+        rates, p = self._machine.rates.address, self._machine.p
         between(rates, p, self._spans, self._starts, self._lengths, self.states, numbers, times[order], values)
         states = np.empty_like(values)
         states[order] = values
@@ -118,8 +138,8 @@ class _MachineStepper:
             self._end, self._limit = self._piece.end, self._longest
         room = min(self._ahead, max(1, self._problem.max_steps - len(self._taken)))
         ends, lengths, states = np.empty(room), np.empty(room), np.empty((room, x.size))
-        middles, piece = np.empty((room if self._watches else 0, x.size)), self._piece
-        (rates, p), span, x = self._machine, np.array([piece.low, piece.high]), np.ascontiguousarray(x)
+        middles, piece, machine = np.empty((room if self._watches else 0, x.size)), self._piece, self._machine
+        rates, p, span, x = machine.rates.address, machine.p, np.array([piece.low, piece.high]), np.ascontiguousarray(x)
         limits = np.array([t, self._end, self._step, self._limit])
         count, following, tried = advance(
             rates, p, span, limits, x, self._problem.atol, self._problem.rtol, ends, lengths, states, FIRST[0],
@@ -164,11 +184,13 @@ class _MachineStepper:
         far = ((np.minimum(np.abs(low), np.abs(high)) > 2 * (high - low)) | (low == high)).all(axis=1)
         near = np.flatnonzero(~far)
         if near.size:
-            times = (starts[near, None] + LOOKS * (ends - starts)[near, None]).ravel()
-            inside = self._watched(times, batch(times)).reshape(near.size, LOOKS.size, -1)
+            times = starts[near, None] + LATER * (ends - starts)[near, None]
+            inside = self._watched(times.ravel(), batch(times.ravel())).reshape(*times.shape, -1)
             course = np.concatenate([before[near, None], inside, after[near, None]], axis=1)
-            moves = np.abs(np.diff(course, axis=1)).max(axis=1)
-            far[near] = ((np.abs(course).min(axis=1) > moves) | (moves == 0)).all(axis=1)
+            heights = course * np.sign(before[near, None])
+            _, low = vertices(np.column_stack([starts[near], times, ends[near]]), heights)
+            still = (course == before[near, None]).all(axis=1)
+            far[near] = ((heights > 0).all(axis=1) & ~low.any(axis=1) | still).all(axis=1)
             near = np.flatnonzero(~far)
         return int(near[0]) if near.size else count
 

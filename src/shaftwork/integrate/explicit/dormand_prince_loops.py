@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit, types
 from scipy.integrate import DOP853
 
-from shaftwork.numerics.machine_code import MATRIX, RATES, VECTOR
+from shaftwork.numerics.machine_code import MATRIX, VECTOR, call_at
 
 STAGES, FURTHER, SHAPES = 12, 3, 7
 """Stages of a step, those that dense output needs besides the slope at the end, and the shapes that make it."""
@@ -34,7 +34,7 @@ def _compiled(signature: Any) -> Callable[[Any], Any]:
     return decorate
 
 
-_F = types.FunctionType(RATES)
+_F = types.int64  # the address of a system
 _part = njit(error_model="numpy")
 
 
@@ -53,7 +53,7 @@ def _all_stages(rates, p, span, t, x, step, slopes, y, end):  # type: ignore[no-
     """Write the slopes of a step whose first is known, and the state at its end."""
     for stage in range(1, STAGES):
         _stage(slopes, stage, BEFORE[stage], x, step, y)
-        rates(min(max(t + NODES[stage] * step, span[0]), span[1]), y, p, slopes[stage])
+        call_at(rates, min(max(t + NODES[stage] * step, span[0]), span[1]), y, p, slopes[stage])
     _stage(slopes, STAGES, WEIGHTS[0], x, step, end)
 
 
@@ -62,7 +62,7 @@ def _shapes(rates, p, span, t, x, step, slopes, y, end, shapes):  # type: ignore
     """Write what makes the dense output of a step from all its slopes, with that at the end."""
     for stage in range(FURTHER):
         _stage(slopes, STAGES + 1 + stage, AFTER[stage], x, step, y)
-        rates(min(max(t + LATER[stage] * step, span[0]), span[1]), y, p, slopes[STAGES + 1 + stage])
+        call_at(rates, min(max(t + LATER[stage] * step, span[0]), span[1]), y, p, slopes[STAGES + 1 + stage])
     for i in range(x.size):
         change = end[i] - x[i]
         shapes[0, i] = change
@@ -94,7 +94,7 @@ def advance(rates, p, span, limits, x, atol, rtol, ends, lengths, states, part, 
     """Make steps until there is no room for more, the end is reached, or one becomes too small.
 
     Args:
-        rates: the system.
+        rates: address of the system.
         p: its parameters.
         span: the earliest and the latest time in s at which it is evaluated.
         limits: time at the start, end, first step and longest step, s.
@@ -113,7 +113,7 @@ def advance(rates, p, span, limits, x, atol, rtol, ends, lengths, states, part, 
     n, (t, end, step, longest) = x.size, limits
     slopes, shapes = np.empty((STAGES + 1 + FURTHER, n)), np.empty((SHAPES, n))
     begin, y, new = x.copy(), np.empty(n), np.empty(n)
-    rates(min(max(t, span[0]), span[1]), x, p, slopes[0])
+    call_at(rates, min(max(t, span[0]), span[1]), x, p, slopes[0])
     count, tried, shrunk = 0, 0, False
     while count < ends.size and t < end:
         if not step > 10 * np.spacing(abs(t)):
@@ -141,7 +141,7 @@ def advance(rates, p, span, limits, x, atol, rtol, ends, lengths, states, part, 
         step = length * (min(1.0, factor) if shrunk else factor)
         shrunk = False
         reached = end if last else t + length
-        rates(min(max(reached, span[0]), span[1]), new, p, slopes[STAGES])
+        call_at(rates, min(max(reached, span[0]), span[1]), new, p, slopes[STAGES])
         if middles.shape[0]:
             _shapes(rates, p, span, t, begin, length, slopes, y, new, shapes)
             _inside(shapes, begin, part, middles[count])
@@ -156,7 +156,7 @@ def between(rates, p, spans, starts, lengths, states, numbers, times, values):  
     """Write the states at times inside steps, which are made again.
 
     Args:
-        rates: the system.
+        rates: address of the system.
         p: its parameters.
         spans: (s, 2) of each step the earliest and latest time in s at which the system is evaluated.
         starts: (s,) of the steps, s.
@@ -173,9 +173,24 @@ def between(rates, p, spans, starts, lengths, states, numbers, times, values):  
         number = numbers[k]
         t, length, x, span = starts[number], lengths[number], states[number], spans[number]
         if number != prepared:
-            rates(min(max(t, span[0]), span[1]), x, p, slopes[0])
+            call_at(rates, min(max(t, span[0]), span[1]), x, p, slopes[0])
             _all_stages(rates, p, span, t, x, length, slopes, y, end)
-            rates(min(max(t + length, span[0]), span[1]), end, p, slopes[STAGES])
+            call_at(rates, min(max(t + length, span[0]), span[1]), end, p, slopes[STAGES])
             _shapes(rates, p, span, t, x, length, slopes, y, end, shapes)
             prepared = number
         _inside(shapes, x, (times[k] - t) / length, values[k])
+
+
+@_compiled(types.void(_F, VECTOR, VECTOR, MATRIX, MATRIX))
+def watch(watched, p, times, states, values):  # type: ignore[no-untyped-def]
+    """Write what is watched at times and states.
+
+    Args:
+        watched: address of what writes it.
+        p: parameters.
+        times: (k,) s.
+        states: (k, n) then.
+        values: (k, m) takes it.
+    """
+    for k in range(times.size):
+        call_at(watched, times[k], states[k], p, values[k])
