@@ -25,15 +25,6 @@ if TYPE_CHECKING:
     from shaftwork.hybrid.hybrid_model import HybridModel
     from shaftwork.pipeline.model import Model
 
-DISPATCHED = {
-    "rates": ("const double *restrict x", "double *restrict dx"),
-    "jacobian": ("const double *restrict x", "double *restrict slopes"),
-    "outputs": ("const double *restrict x", "double *restrict y"),
-    "stores": ("const double *restrict x", "double *restrict stored"),
-    "take_up": ("const double *restrict stored", "double *restrict x"),
-}
-"""Functions of which each set of equations has its own, and their arguments behind instance and time."""
-
 
 class Variable(NamedTuple):
     """A number of the C code.
@@ -148,11 +139,12 @@ class CodeWriter:
     def _source(self) -> str:
         modes, statements = self.modes, Statements(self._names, self._model.name)
         states, outputs = (tuple(v.name for v in some) for some in (self.states, self.outputs))
-        layout = ArrayLayout(states, self.stores, outputs, statements)
+        layout = ArrayLayout(states, self.stores, outputs, modes is not None, statements)
         functions = [SetFunctions(number, one, layout) for number, one in enumerate(self.sets)]
         still = [symbol for symbol, code in self._names.items() if code.startswith(("m->p", "m->u"))]
         body = [one.text for one in functions]
-        body += [dispatcher(name, arguments, len(functions)) for name, arguments in DISPATCHED.items()]
+        names = ("rates", "jacobian", "outputs", "stores", "take_up")
+        body += [dispatcher(name, len(functions)) for name in names]
         body += modes.texts(functions, statements) if modes else [_NO_GUARDS]
         body.append(Instants(self._model.form.graph, still).text(statements))
         text = "\n".join(body)
