@@ -145,7 +145,7 @@ class CodeWriter:
         body = [one.text for one in functions]
         names = ("rates", "jacobian", "outputs", "stores", "take_up")
         body += [dispatcher(name, len(functions)) for name in names]
-        body += modes.texts(functions, statements) if modes else [_NO_GUARDS]
+        body += modes.texts(functions, statements) if modes else [runtime("no_modes.c")]
         body.append(Instants(self._model.form.graph, still).text(statements))
         text = "\n".join(body)
         tables = [
@@ -153,30 +153,14 @@ class CodeWriter:
             for table, k in statements.tables.items()
             for axis, points in (("X", table.xs), ("Y", table.ys))
         ]
-        calls = {"points.c": "table", "table.c": "table(", "table_slope.c": "table_slope(", "noise.c": "held_noise("}
+        calls = {"points.c": "table", "noise.c": "held_noise("}
+        calls |= {f"{name}.c": f"{name}(" for name in ("table", "table_slope", "next_level", "next_whole")}
         helpers = ["numbers.c"] * (modes is not None or "solve(" in text)
         helpers += [file for file, call in calls.items() if call in text]
-        return "\n".join(
-            [
-                runtime("head.c"),
-                self._nominal,
-                *tables,
-                *map(runtime, helpers),
-                text,
-                runtime("dop853.c"),
-                *map(
-                    runtime,
-                    (
-                        "solver.c",
-                        "jumps.c",
-                        *(("events.c", "impacts.c", "iteration.c") if modes else ("smooth.c",)),
-                        "common.c",
-                    ),
-                ),
-                *(modes.names if modes else [_NO_MODES]),
-                self._init,
-            ]
-        )
+        events = ("events.c", "impacts.c", "iteration.c") if modes else ("smooth.c",)
+        first = [runtime("head.c"), self._nominal, *tables, *map(runtime, helpers), text]
+        last = map(runtime, ("dop853.c", "solver.c", "jumps.c", *events, "common.c"))
+        return "\n".join([*first, *last, *(modes.names if modes else ()), self._init])
 
     @property
     def _nominal(self) -> str:
@@ -202,18 +186,3 @@ _INIT = """void NAME_init(NAME *m)
     memset(m, 0, sizeof *m);
     m->look_ahead = 1e-6;
     m->most_steps = 1000000;"""
-_NO_GUARDS = """static void guards(const NAME *m, double t, const double *x, double *g)
-{
-    (void)m;
-    (void)t;
-    (void)x;
-    g[0] = -1.0;
-}
-"""
-_NO_MODES = """const char *NAME_mode_name(int machine, int mode)
-{
-    (void)machine;
-    (void)mode;
-    return "";
-}
-"""
