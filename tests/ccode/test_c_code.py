@@ -24,9 +24,9 @@ from tests.properties.examples import compiled, share_of_examples
 from tests.properties.test_hybrid_reference import RESTS, Draw, end, network
 from tests.strategies import Network, networks
 
-RTOL = 1e-11
-MOTION = 1e-8
-"""Of the largest value: two methods with a tolerance of 1e-11 differ by some hundred times that after many periods."""
+RTOL = 1e-12
+MOTION = 1e-9
+"""Of the largest value: two methods with a tolerance of 1e-12 differ by some hundred times that after many periods."""
 
 
 def two_masses(tau: object = 5.0) -> sw.Network:
@@ -96,12 +96,11 @@ def test_scenes_move_as_in_the_library(name: str, tmp_path: Path) -> None:
     scene = SCENES[name]
     model, t_end = scene().compile(), scene.t_end / (1 if name in (*QUICK, "six-phases") else 10)
     library = Library(c_code(model), tmp_path)
-    library.call("integrate", t_end, 0.1 * RTOL)
+    library.call("integrate", t_end, 0.01 * RTOL)  # shafts without damping swing thousands of times
     sol = model.simulate(t_end, rtol=RTOL, t_eval=200)
     largest = [max(np.abs(sol[variable.name]).max(), 1e-3) for variable in library.code.states]
     wanted = [sol[variable.name][-1] for variable in library.code.states]
-    # the load of the excavator has kinks over the angle, and shafts without damping swing thousands of times
-    assert (np.abs(library.x - wanted) / largest).max() < MOTION * (1 if name in QUICK else 50)
+    assert (np.abs(library.x - wanted) / largest).max() < MOTION
     if model.phased:
         assert library.modes == [*sol.phases[-1].modes.values()]
 
@@ -179,16 +178,14 @@ def test_an_instance_is_saved_and_restored_as_it_is(tmp_path: Path) -> None:
 
 
 def test_fixed_steps_follow_the_modes(tmp_path: Path) -> None:
-    """Events are found within steps; those of 1 ms at the 4 Hz of the crane lose 1e-6."""
+    """Events are found within steps; those of 10 ms at the 4 Hz of the crane lose nothing by order 8."""
     model = crane().compile()
     library = Library(c_code(model), tmp_path)
     while library.struct.t < 10.0 - 1e-9:
-        library.call("step_rk4", 1e-3)
-    sol = model.simulate(10.0, t_eval=200)
+        library.call("step", 1e-2)
+    sol = model.simulate(10.0, rtol=RTOL, t_eval=200)
     assert library.modes == [*sol.phases[-1].modes.values()]
-    assert library.outputs()["shaft.tau"] == pytest.approx(
-        sol["shaft.tau"][-1], abs=1e-2 * np.abs(sol["shaft.tau"]).max()
-    )
+    assert difference(library, sol) < MOTION
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])

@@ -101,6 +101,20 @@ def test_a_freewheel_that_alone_carries_the_torque_of_a_spring_stays_locked_in_a
     assert_moves_as_in_the_library(net, 1.0, tmp_path)
 
 
+def test_an_impact_loses_no_digits(tmp_path: Path) -> None:
+    """Momentum and the share of the speed that comes back: closed form, to rounding."""
+    net = sw.Network("impact")
+    net.add(sw.Inertia("J1", J=2.0), "a")
+    net.add(sw.Backlash("gap", gap=0.2, restitution=0.5), "a", "b")
+    net.add(sw.Inertia("J2", J=3.0), "b")
+    library = Library(c_code(net.compile()), tmp_path)
+    library.struct.start[library.code.stores.index("J1.omega")] = 5.0
+    library.call("start", 0.0)
+    library.call("integrate", 0.05, RTOL)
+    outputs = library.outputs()
+    assert [outputs["J1.omega"], outputs["J2.omega"]] == pytest.approx([0.5, 3.0], rel=1e-14)
+
+
 def two_masses(tau: object) -> sw.Network:
     net = sw.Network("two masses")
     net.add(sw.TorqueSource("motor", tau=tau), "a")

@@ -286,6 +286,17 @@ def test_export_writes_over_nothing(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert main(["export", "crane-start", str(path)]) == WRONG_INPUT
     assert "exists already" in capsys.readouterr().err
     assert path.read_text(encoding="utf-8") == "mine"
+    edited = tmp_path / "main.c"
+    edited.write_text("mine", encoding="utf-8")
+    for option, place, file in (
+        ("--c", tmp_path, edited),
+        *((one, path, path) for one in ("--spice", "--modelica", "--fmu")),
+    ):
+        assert main(["export", "crane-start", option, str(place)]) == WRONG_INPUT
+        assert f"'{file}' exists already. Give another name, or write over it by --replace." in capsys.readouterr().err
+        assert file.read_text(encoding="utf-8") == "mine"
+    assert main(["export", "crane-start", "--spice", str(path), "--replace"]) == DONE
+    assert ".tran" in path.read_text(encoding="utf-8")
     assert main(["export", "crane-start", str(tmp_path / "crane.txt")]) == WRONG_INPUT
     assert "must end in .toml" in capsys.readouterr().err
 
@@ -533,9 +544,7 @@ def test_a_network_is_exported_for_other_tools(tmp_path: Path, capsys: pytest.Ca
     assert main(["export", "crane-start", "--spice", str(deck), "--modelica", str(package)]) == DONE
     assert ".tran" in deck.read_text(encoding="utf-8")
     assert "Modelica.Mechanics.Rotational" in package.read_text(encoding="utf-8")
-    assert main(["export", "crane-start", "--c", str(tmp_path / "code"), "--input", "motor.n_sync"]) in (
-        DONE,
-        WRONG_INPUT,
-    )
-    assert main(["export", "crane-start", "--spice", str(deck), "--input", "motor.tau"]) == WRONG_INPUT
+    assert main(["export", "crane-start", "--c", str(tmp_path), "--output", "J2.omega"]) == DONE
+    assert str(tmp_path / "main.c") in capsys.readouterr().out
+    assert main(["export", "crane-start", "--spice", str(deck), "--replace", "--input", "motor.tau"]) == WRONG_INPUT
     assert "Leave out --input" in capsys.readouterr().err

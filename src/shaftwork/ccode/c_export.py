@@ -14,6 +14,7 @@ from shaftwork.components.laws import as_expression
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.core.files import replaced
+from shaftwork.core.parameters import in_si
 from shaftwork.formulation.sampling_instants import refuse_sampled
 from shaftwork.network.netlist import listed
 from shaftwork.pipeline.arguments import STAND_IN, Names, as_names
@@ -67,13 +68,12 @@ class CCode:
         Raises:
             OSError: a file cannot be written.
         """
-        place = Path(folder)
-        texts = {f"{self.name}.h": self.header, f"{self.name}.c": self.source, "main.c": self.example}
-        place.mkdir(parents=True, exist_ok=True)
-        for file, text in texts.items():
-            with replaced(place / file) as stream:
+        paths = tuple(Path(folder, file) for file in _files(self.name))
+        paths[0].parent.mkdir(parents=True, exist_ok=True)
+        for path, text in zip(paths, (self.header, self.source, self.example), strict=True):
+            with replaced(path) as stream:
                 stream.write(text)
-        return tuple(place / file for file in texts)
+        return paths
 
 
 def c_code(
@@ -84,18 +84,8 @@ def c_code(
     outputs: Names = None,
     t_end: float = 10.0,
 ) -> CCode:
-    """A model in C; arguments as of `Model.to_c`.
-
-    Args:
-        model: the compiled network.
-        name, inputs, outputs: as there.
-        t_end: end of the motion in the example program, s.
-
-    Raises:
-        ParameterError: a name is none, or an input is no law.
-        SignalError: an output does not exist.
-        CompileError: the equations have no code in C.
-    """
+    """A model in C; arguments and errors as of `Model.to_c`."""
+    end = in_si("t_end", t_end, "s", above=0)
     called = c_name(model.name) if name is None else checked_name(name)
     values = _input_values(model, as_names(inputs or ()))
     if values:
@@ -104,7 +94,7 @@ def c_code(
     writer = CodeWriter(model, values, None if outputs is None else as_names(outputs))
     return CCode(
         called,
-        *writer.texts(called, t_end),
+        *writer.texts(called, end),
         writer.states,
         writer.parameters,
         writer.inputs,
@@ -120,6 +110,15 @@ def c_name(title: str) -> str:
     plain = re.sub(r"\W+", "_", title, flags=re.ASCII).strip("_")[:LONGEST] or "model"
     plain = plain if plain[0].isalpha() else f"model_{plain}"[:LONGEST]
     return f"{plain}_model" if is_taken(plain) else plain
+
+
+def file_names(title: str) -> tuple[str, str, str]:
+    """Header, source and example of a model with a title."""
+    return _files(c_name(title))
+
+
+def _files(name: str) -> tuple[str, str, str]:
+    return f"{name}.h", f"{name}.c", "main.c"
 
 
 def is_taken(name: str) -> bool:

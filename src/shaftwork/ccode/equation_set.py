@@ -8,7 +8,7 @@ from functools import cached_property
 
 from shaftwork.codegen.compiled_model import CompiledModel
 from shaftwork.core.errors import CompileError
-from shaftwork.formulation.explicit_rows import BlockTooLargeError, Rows, explicit_rows
+from shaftwork.formulation.explicit_rows import LARGEST_BLOCK, BlockTooLargeError, Rows, explicit_rows
 from shaftwork.formulation.form import StateForm
 from shaftwork.formulation.observables import Observables
 from shaftwork.pipeline.prepared import nominal_tolerances
@@ -40,8 +40,9 @@ class EquationSet:
             return explicit_rows(self.form)
         except BlockTooLargeError:
             raise CompileError(
-                f"'{self.form.graph.name}' has no equations line by line: more than three speeds or torques are "
-                "coupled rigidly. Put a spring between some of the gears, or simulate it here."
+                f"'{self.form.graph.name}' has no equations line by line: more than {LARGEST_BLOCK} speeds, torques or "
+                "voltages determine each other at once. Give some of their nodes an inertia or a capacitor, put a "
+                "spring between gears, or simulate it here."
             ) from None
 
     @cached_property

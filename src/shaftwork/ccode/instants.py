@@ -97,9 +97,8 @@ class Instants:
             )
         for slope, offset in self.whole:
             lines += self._block(statements, slope, offset, "next_whole(slope, offset, t)")
-        helpers = (_NEXT_LEVEL if self.levels else "") + (_NEXT_WHOLE if self.whole else "")
         lines.append("return next;")
-        return helpers + "\n".join([*tables, function("double next_time(const NAME *m, double t)", lines)])
+        return "\n".join([*tables, function("double next_time(const NAME *m, double t)", lines)])
 
     @staticmethod
     def _block(statements: Statements, slope: Expr, offset: Expr, call: str) -> Iterator[str]:
@@ -157,34 +156,3 @@ def _unsolved(part: str, why: str) -> CompileError:
         "there is no formula. It knows those of lines in time and of single sines. Make the parameter an input, which "
         "the program sets, or simulate it here."
     )
-
-
-_NEXT_LEVEL = """/* The first time after t at which a line passes one of its levels, which increase. */
-static double next_level(double slope, double offset, int n, const double *levels, double t)
-{
-    int low = 0, high = n;
-    if (slope == 0.0) return INFINITY;
-    while (low < high) {
-        const int middle = low + (high - low) / 2;
-        const double time = (levels[middle] - offset) / slope;
-        if (slope > 0.0 ? time <= t : time > t) low = middle + 1;
-        else high = middle;
-    }
-    if (slope > 0.0) return low < n ? (levels[low] - offset) / slope : INFINITY;
-    return low > 0 ? (levels[low - 1] - offset) / slope : INFINITY;
-}
-
-"""
-_NEXT_WHOLE = """/* The first time after t at which a line passes a whole number. */
-static double next_whole(double slope, double offset, double t)
-{
-    const double value = slope * t + offset;
-    if (slope == 0.0) return INFINITY;
-    for (int n = 0; n < 3; n++) {
-        const double time = ((slope > 0.0 ? floor(value) + n : ceil(value) - n) - offset) / slope;
-        if (time > t) return time;
-    }
-    return INFINITY;
-}
-
-"""

@@ -132,35 +132,29 @@ class ModeTables:
 
     def texts(self, functions: Sequence[SetFunctions], statements: Statements) -> list[str]:
         """The functions and tables of all sets."""
-        x = "const double *restrict x"
         texts = [runtime("modes.c"), *self._tables()]
         for one, guards in zip(functions, self._guards, strict=True):
             texts += [*self._of_set(one, guards)]
-        arguments = {"guards": "g", "across": "speeds", "begins": "holds", "masses": "mass", "shares": "gains"}
-        texts += [dispatcher(name, (x, f"double *restrict {into}"), len(functions)) for name, into in arguments.items()]
+        names = ("guards", "across", "begins", "masses", "shares")
+        texts += [dispatcher(name, len(functions)) for name in names]
         return [*texts, self._leave_numbers(functions[0], statements)]
 
     def _of_set(self, one: SetFunctions, guards: ModeGuards) -> Iterator[str]:
         """The functions of a set: guards, speeds across machines, where motions begin, and answers to impulses."""
-        x, machines, size = "const double *restrict x, ", enumerate(self._machines), self._most_modes
-        parts = {part.name: part for part in one.form.graph.parts}
-        fewer = [f"g[{k}] = 0.0;" for k in range(len(guards.expressions), self.most_guards)]
-        lines = one.assigned(self._numbered("g", len(guards.expressions)), guards.expressions)
-        yield one.written("guards", f"{x}double *restrict g", [*lines, *fewer])
+        parts, size = {part.name: part for part in one.form.graph.parts}, self._most_modes
+        fewer = [Integer(0)] * (self.most_guards - len(guards.expressions))
+        yield one.written("guards", self._numbered("g", self.most_guards), [*guards.expressions, *fewer])
         speeds, begins = list[Expr](), dict[str, Expr]()
-        for k, machine in machines:
+        for k, machine in enumerate(self._machines):
             part = parts[machine.part.name]
             speeds.append(one.observables.guard(part, machine.modes, ACROSS))
             for n, mode in enumerate(machine.modes.options):
                 condition = Piecewise((Integer(1), mode.starts), (Integer(0), True))
                 begins[f"holds[{k * size + n}]"] = one.observables.guard(part, machine.modes, condition)
-        yield one.written(
-            "across", f"{x}double *restrict speeds", [*one.assigned(self._numbered("speeds", len(speeds)), speeds)]
-        )
-        yield one.written("begins", f"{x}double *restrict holds", [*one.assigned([*begins], [*begins.values()])])
-        yield one.mass("masses") if one.form.across_states else one.written("masses", f"{x}double *restrict mass", [])
+        yield one.written("across", self._numbered("speeds", len(speeds)), speeds)
+        yield one.written("begins", [*begins], [*begins.values()])
         gains = dict(self._gains(one, speeds))
-        yield one.written("shares", f"{x}double *restrict gains", [*one.assigned([*gains], [*gains.values()])])
+        yield one.written("shares", [*gains], [*gains.values()])
 
     @staticmethod
     def _numbered(name: str, count: int) -> list[str]:

@@ -9,6 +9,7 @@ from functools import cached_property
 from sympy import Add, Expr, Integer, Symbol
 
 from shaftwork.ccode.c_printing import Statements, function
+from shaftwork.ccode.c_texts import signature
 from shaftwork.ccode.equation_set import EquationSet
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.law_slopes import slope
@@ -26,12 +27,14 @@ class ArrayLayout:
         states: names of the states of all sets of equations.
         stores: names of everything that is stored.
         outputs: names of the outputs.
+        has_modes: whether there are impacts, which need the inertias of the states.
         statements: writes expressions.
     """
 
     states: tuple[str, ...]
     stores: tuple[str, ...]
     outputs: tuple[str, ...]
+    has_modes: bool
     statements: Statements
 
 
@@ -64,13 +67,16 @@ class SetFunctions:
     def text(self) -> str:
         """All functions."""
         parts = [self._rates(), self._jacobian(), self._outputs(), self._stores()]
-        parts += [self.mass()] if self._ties else []
+        parts += [self._masses()] if self._ties or self.layout.has_modes else []
         parts += [self._take_up()]
         return "\n".join(parts)
 
-    def written(self, name: str, arguments: str, lines: Sequence[str]) -> str:
-        """A function of this set: its name ends with the number of the set."""
-        return function(f"void {name}_{self.number}(const NAME *m, double t, {arguments})", [*lines])
+    def written(self, name: str, targets: Sequence[str], expressions: Sequence[Expr]) -> str:
+        """A function of this set that assigns expressions to targets: its name ends with the number of the set."""
+        return self._function(name, [*self.assigned(targets, expressions)])
+
+    def _function(self, name: str, lines: Sequence[str]) -> str:
+        return function(signature(name, f"_{self.number}"), lines)
 
     def assigned(self, targets: Sequence[str], expressions: Sequence[Expr]) -> Iterator[str]:
         """Lines that assign expressions to targets."""
@@ -83,9 +89,7 @@ class SetFunctions:
             if name in self._dependent:  # so that all states of a motion have rates in all of its modes
                 targets.append(f"dx[{self.layout.states.index(name)}]")
                 expressions.append(self._dependent[name])
-        return self.written(
-            "rates", "const double *restrict x, double *restrict dx", [*self.assigned(targets, expressions)]
-        )
+        return self.written("rates", targets, expressions)
 
     @cached_property
     def _dependent(self) -> Mapping[str, Expr]:
@@ -113,25 +117,19 @@ class SetFunctions:
                 if state in symbols:
                     targets.append(f"slopes[{row * size + column}]")
                     slopes.append(slope(rate, state))
-        return self.written(
-            "jacobian", "const double *restrict x, double *restrict slopes", [*self.assigned(targets, slopes)]
-        )
+        return self.written("jacobian", targets, slopes)
 
     def _outputs(self) -> str:
         expressions = [self.observables.quantity(name) for name in self.layout.outputs]
         targets = [f"y[{k}]" for k in range(len(expressions))]
-        return self.written(
-            "outputs", "const double *restrict x, double *restrict y", [*self.assigned(targets, expressions)]
-        )
+        return self.written("outputs", targets, expressions)
 
     def _stores(self) -> str:
         expressions = [self.observables.store(name) for name in self.layout.stores]
         targets = [f"stored[{k}]" for k in range(len(expressions))]
-        return self.written(
-            "stores", "const double *restrict x, double *restrict stored", [*self.assigned(targets, expressions)]
-        )
+        return self.written("stores", targets, expressions)
 
-    def mass(self, name: str = "mass") -> str:
+    def _masses(self) -> str:
         """C + Q K F': the inertias of the states with all that turns with them, an array (n, n) of zeros before."""
         form, n = self.form, len(self.form.across_states)
         entries = {(k, k): form.law_of(branch) for k, branch in enumerate(form.across_states)}
@@ -141,9 +139,7 @@ class SetFunctions:
                 at = form.across_states.index(first), form.across_states.index(second)
                 entries[at] = entries.get(at, Integer(0)) + share * form.law_of(link) * gain
         targets = [f"mass[{row * n + column}]" for row, column in entries]
-        return self.written(
-            name, "const double *restrict x, double *restrict mass", [*self.assigned(targets, [*entries.values()])]
-        )
+        return self.written("masses", targets, [*entries.values()])
 
     def _row(self, rows: Mapping[int, Row], link: int) -> list[tuple[int, Expr]]:
         """Gains of states of speed in the loop or the cutset of a link."""
@@ -158,7 +154,7 @@ class SetFunctions:
         tied = {"across": self._ties, "through": self._slack, "integral": ()}
         free = [(place, state) for place, state in zip(self.places, form.states, strict=True) if not tied[state.kind]]
         lines += self.assigned([f"x[{place}]" for place, _ in free], [stored_symbol(state.name) for _, state in free])
-        return self.written("take_up", "const double *restrict stored, double *restrict x", lines)
+        return self._function("take_up", lines)
 
     def _speeds_taken_up(self) -> Iterator[str]:
         """(C + Q K F') x = C v + Q K (v_K - F_E' e)."""
@@ -171,7 +167,7 @@ class SetFunctions:
             for tree, share in self._row(form.tree.cutsets, link):
                 right[tree] += share * form.law_of(link) * (self._stored(link) - prescribed)
         yield f"double mass[{n * n}] = {{0.0}}, right[{n}];"
-        yield f"mass_{self.number}(m, t, stored, mass);"
+        yield f"masses_{self.number}(m, t, stored, mass);"
         yield from self._block([f"right[{k}]" for k in range(n)], [*right.values()])
         yield f"solve({n}, mass, 1, right);"
         yield from (f"x[{place}] = right[{k}];" for k, place in enumerate(self.places[form.speeds]))

@@ -25,15 +25,6 @@ if TYPE_CHECKING:
     from shaftwork.hybrid.hybrid_model import HybridModel
     from shaftwork.pipeline.model import Model
 
-DISPATCHED = {
-    "rates": ("const double *restrict x", "double *restrict dx"),
-    "jacobian": ("const double *restrict x", "double *restrict slopes"),
-    "outputs": ("const double *restrict x", "double *restrict y"),
-    "stores": ("const double *restrict x", "double *restrict stored"),
-    "take_up": ("const double *restrict stored", "double *restrict x"),
-}
-"""Functions of which each set of equations has its own, and their arguments behind instance and time."""
-
 
 class Variable(NamedTuple):
     """A number of the C code.
@@ -148,12 +139,13 @@ class CodeWriter:
     def _source(self) -> str:
         modes, statements = self.modes, Statements(self._names, self._model.name)
         states, outputs = (tuple(v.name for v in some) for some in (self.states, self.outputs))
-        layout = ArrayLayout(states, self.stores, outputs, statements)
+        layout = ArrayLayout(states, self.stores, outputs, modes is not None, statements)
         functions = [SetFunctions(number, one, layout) for number, one in enumerate(self.sets)]
         still = [symbol for symbol, code in self._names.items() if code.startswith(("m->p", "m->u"))]
         body = [one.text for one in functions]
-        body += [dispatcher(name, arguments, len(functions)) for name, arguments in DISPATCHED.items()]
-        body += modes.texts(functions, statements) if modes else [_NO_GUARDS]
+        names = ("rates", "jacobian", "outputs", "stores", "take_up")
+        body += [dispatcher(name, len(functions)) for name in names]
+        body += modes.texts(functions, statements) if modes else [runtime("no_modes.c")]
         body.append(Instants(self._model.form.graph, still).text(statements))
         text = "\n".join(body)
         tables = [
@@ -161,30 +153,14 @@ class CodeWriter:
             for table, k in statements.tables.items()
             for axis, points in (("X", table.xs), ("Y", table.ys))
         ]
-        calls = {"points.c": "table", "table.c": "table(", "table_slope.c": "table_slope(", "noise.c": "held_noise("}
+        calls = {"points.c": "table", "noise.c": "held_noise("}
+        calls |= {f"{name}.c": f"{name}(" for name in ("table", "table_slope", "next_level", "next_whole")}
         helpers = ["numbers.c"] * (modes is not None or "solve(" in text)
         helpers += [file for file, call in calls.items() if call in text]
-        return "\n".join(
-            [
-                runtime("head.c"),
-                self._nominal,
-                *tables,
-                *map(runtime, helpers),
-                text,
-                runtime("dop853.c"),
-                *map(
-                    runtime,
-                    (
-                        "solver.c",
-                        "jumps.c",
-                        *(("events.c", "impacts.c", "iteration.c") if modes else ("smooth.c",)),
-                        "common.c",
-                    ),
-                ),
-                *(modes.names if modes else [_NO_MODES]),
-                self._init,
-            ]
-        )
+        events = ("events.c", "impacts.c", "iteration.c") if modes else ("smooth.c",)
+        first = [runtime("head.c"), self._nominal, *tables, *map(runtime, helpers), text]
+        last = map(runtime, ("dop853.c", "solver.c", "jumps.c", *events, "common.c"))
+        return "\n".join([*first, *last, *(modes.names if modes else ()), self._init])
 
     @property
     def _nominal(self) -> str:
@@ -210,18 +186,3 @@ _INIT = """void NAME_init(NAME *m)
     memset(m, 0, sizeof *m);
     m->look_ahead = 1e-6;
     m->most_steps = 1000000;"""
-_NO_GUARDS = """static void guards(const NAME *m, double t, const double *x, double *g)
-{
-    (void)m;
-    (void)t;
-    (void)x;
-    g[0] = -1.0;
-}
-"""
-_NO_MODES = """const char *NAME_mode_name(int machine, int mode)
-{
-    (void)machine;
-    (void)mode;
-    return "";
-}
-"""

@@ -23,36 +23,39 @@ class Export(NamedTuple):
         option: of the command line, without dashes.
         place: what it takes, for the help.
         text: the help.
-        write: writes a network into a place with inputs, outputs and the end of an example in s; returns the paths.
+        write: writes a network into a place with inputs, outputs and the end of an example in s.
+        files: that it writes there.
     """
 
     option: str
     place: str
     text: str
-    write: Callable[[Network, str, list[str], list[str] | None, float], Iterable[Path]]
+    write: Callable[[Network, Path, list[str], list[str] | None, float], object]
+    files: Callable[[Network, Path], tuple[Path, ...]] = lambda _, place: (place,)
 
 
-def _c(net: Network, place: str, inputs: list[str], outputs: list[str] | None, t_end: float) -> Iterable[Path]:
-    from shaftwork.ccode.c_export import c_code
-
-    return c_code(net.compile(), inputs=inputs, outputs=outputs, t_end=t_end).write(place)
+def _c(net: Network, place: Path, inputs: list[str], outputs: list[str] | None, t_end: float) -> None:
+    net.compile().to_c(place, inputs=inputs, outputs=outputs, t_end=t_end)
 
 
-def _fmu(net: Network, place: str, inputs: list[str], outputs: list[str] | None, t_end: float) -> Iterable[Path]:
+def _c_files(net: Network, place: Path) -> tuple[Path, ...]:
+    from shaftwork.ccode.c_export import file_names
+
+    return tuple(place / file for file in file_names(net.name))
+
+
+def _fmu(net: Network, place: Path, inputs: list[str], outputs: list[str] | None, t_end: float) -> None:
     net.compile().to_fmu(place, inputs=inputs, outputs=outputs, t_end=t_end)
-    return [Path(place)]
 
 
-def _spice(net: Network, place: str, inputs: list[str], outputs: list[str] | None, t_end: float) -> Iterable[Path]:
+def _spice(net: Network, place: Path, inputs: list[str], outputs: list[str] | None, t_end: float) -> None:
     _refuse_chosen("spice", inputs, outputs)
     net.to_spice(place, t_end=t_end)
-    return [Path(place)]
 
 
-def _modelica(net: Network, place: str, inputs: list[str], outputs: list[str] | None, t_end: float) -> Iterable[Path]:
+def _modelica(net: Network, place: Path, inputs: list[str], outputs: list[str] | None, t_end: float) -> None:
     _refuse_chosen("modelica", inputs, outputs)
     net.to_modelica(place, t_end=t_end)
-    return [Path(place)]
 
 
 def _refuse_chosen(option: str, inputs: list[str], outputs: list[str] | None) -> None:
@@ -61,7 +64,7 @@ def _refuse_chosen(option: str, inputs: list[str], outputs: list[str] | None) ->
 
 
 EXPORTS = (
-    Export("c", "DIR", "C code in a folder: equations, modes, events, integrators and an example", _c),
+    Export("c", "DIR", "C code in a folder: equations, modes, events, integrators and an example", _c, _c_files),
     Export("fmu", "NEW.fmu", "functional mock-up unit (FMI 3.0) for model exchange and co-simulation", _fmu),
     Export("spice", "NEW.cir", "analogue circuit for ngspice", _spice),
     Export("modelica", "NEW.mo", "package in Modelica, part by part", _modelica),
@@ -84,6 +87,7 @@ def export_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--output", metavar="NAME", action="append", help="a quantity that it tells (default: all); as often as needed"
     )
+    parser.add_argument("--replace", action="store_true", help="write over files that exist")
 
 
 @command("the model file of a scene; or C code, FMU, SPICE, Modelica", export_options)
@@ -98,11 +102,20 @@ def export(options: Namespace, say: Say) -> Data:
     from shaftwork.pipeline.arguments import FALLBACK_END
 
     net, scene = load(options)
-    for one in chosen:
-        end = scene.t_end if scene else FALLBACK_END
-        for path in one.write(net, getattr(options, one.option), options.input, options.output, end):
-            say(f"written: {path}")
+    places = [(one, Path(getattr(options, one.option))) for one in chosen]
+    files = [file for one, place in places for file in one.files(net, place)]
+    _refuse_existing(files, options)
+    for one, place in places:
+        one.write(net, place, options.input, options.output, scene.t_end if scene else FALLBACK_END)
+    for file in files:
+        say(f"written: {file}")
     return {}
+
+
+def _refuse_existing(files: Iterable[Path], options: Namespace) -> None:
+    for file in files:
+        if file.is_file() and not options.replace:
+            raise ParameterError(f"'{file}' exists already. Give another name, or write over it by --replace.")
 
 
 def _refuse_without(options: Namespace) -> None:
@@ -121,8 +134,7 @@ def _model_file(options: Namespace, say: Say) -> Data:
         path = Path(options.file)
         if path.suffix != ".toml":
             raise ParameterError(f"'{path}' must end in .toml, so that the other commands take it for a model file.")
-        if path.exists():
-            raise ParameterError(f"'{path}' exists already. Give another name, or delete it.")
+        _refuse_existing([path], options)
         net.save(path)
         say(f"written: {path}")
     if scene:

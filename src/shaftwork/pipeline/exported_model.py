@@ -26,8 +26,8 @@ class ExportedModel(CompiledModel):
         outputs: Sequence[str] | None = None,
         t_end: float = 10.0,
         binary: bool = True,
-    ) -> None:
-        """Write the model as a functional mock-up unit (FMI), which other tools of simulation import.
+    ) -> Path:
+        """Write the model as a functional mock-up unit (FMI), which other tools of simulation import; returns its path.
 
         All that simulates is in it, with modes and events; its source code is inside, so that it can be compiled for
         another machine. The states of all parts and the parameters keep their names.
@@ -50,10 +50,16 @@ class ExportedModel(CompiledModel):
         """
         from shaftwork.fmu.export_unit import export_unit
 
-        export_unit(cast("Model", self), path, version, kind, inputs, outputs, t_end, binary=binary)
+        return export_unit(cast("Model", self), path, version, kind, inputs, outputs, t_end, binary=binary)
 
     def to_c(
-        self, folder: str | Path, *, name: str | None = None, inputs: Names = (), outputs: Names = None
+        self,
+        folder: str | Path,
+        *,
+        name: str | None = None,
+        inputs: Names = (),
+        outputs: Names = None,
+        t_end: float = 10.0,
     ) -> tuple[Path, ...]:
         """Write the model as C99 code into a folder: NAME.h, NAME.c and an example main.c; returns their paths.
 
@@ -62,10 +68,11 @@ class ExportedModel(CompiledModel):
             name: of the model in C; by default that of the network.
             inputs: parameters that the program sets as it runs, "motor.tau", in place of their laws.
             outputs: any quantities; by default all but energies and powers.
+            t_end: end of the motion in the example, s.
 
         Raises:
             CompileError, ParameterError, SignalError: there is no such code, name, input or output; says why.
         """
         from shaftwork.ccode.c_export import c_code
 
-        return c_code(cast("Model", self), name=name, inputs=inputs, outputs=outputs).write(folder)
+        return c_code(cast("Model", self), name=name, inputs=inputs, outputs=outputs, t_end=t_end).write(folder)

@@ -92,8 +92,8 @@ int NAME_event(NAME *m);
 /* The first instant after t at which a law of time jumps or bends; infinity where there is none. */
 double NAME_next_time(const NAME *m, double t);
 
-/* A step of h seconds by the classical method of Runge and Kutta, with events where they are. 0 or a fault. */
-int NAME_step_rk4(NAME *m, double h);
+/* A step of h seconds by the same method as NAME_integrate, with events where they are. 0 or a fault. */
+int NAME_step(NAME *m, double h);
 
 /* On to t_end with all events, by Dormand and Prince's method of order 8 with step size control. 0 or a fault. */
 int NAME_integrate(NAME *m, double t_end, double rtol);

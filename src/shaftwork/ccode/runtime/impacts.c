@@ -146,7 +146,9 @@ static void push(NAME *m, const double *answers, int n, const double *impulses)
         for (int j = 0; j < speeds; j++) m->x[SPEED_PLACE[m->set * NX + j]] += answers[k * speeds + j] * impulses[k];
 }
 
-/* lambda >= 0 with w = W lambda + q >= 0 and lambda w = 0 by an active set (Lawson, Hanson 1974); 0 where none is found. */
+/* lambda >= 0 with w = W lambda + q >= 0 and lambda w = 0 by an active set (Lawson, Hanson 1974); 0 where none is found.
+ * A little more on the diagonal finds the least of many solutions; what that takes from it two further solutions give
+ * back. */
 static int complementary(const double *W, const double *q, int n, double *impulses)
 {
     double scale[MOST_CONTACTS], V[MOST_CONTACTS * MOST_CONTACTS], b[MOST_CONTACTS], wanted[MOST_CONTACTS];
@@ -161,8 +163,8 @@ static int complementary(const double *W, const double *q, int n, double *impuls
         impulses[i] = 0.0;
     }
     for (int i = 0; i < n; i++)
-        for (int k = 0; k < n; k++) V[i * n + k] = W[i * n + k] * scale[i] * scale[k] + (i == k ? 1e-10 : 0.0);
-    for (int round = 0; round <= 3 * n; round++) {
+        for (int k = 0; k < n; k++) V[i * n + k] = W[i * n + k] * scale[i] * scale[k];
+    for (int round = 0, polished = 0; round <= 3 * n + 2; round++) {
         int worst = -1;
         double least = -1e-12 * most;
         for (int i = 0; i < n; i++) {
@@ -173,11 +175,11 @@ static int complementary(const double *W, const double *q, int n, double *impuls
                 worst = i;
             }
         }
-        if (worst < 0) {
+        if (worst >= 0) active[worst] = 1;
+        else if (polished++ == 2) {
             for (int i = 0; i < n; i++) impulses[i] *= scale[i];
             return 1;
         }
-        active[worst] = 1;
         for (int inner = 0; inner <= n; inner++) {
             int size = 0, pulls = 0;
             double share = 1.0;
@@ -185,14 +187,18 @@ static int complementary(const double *W, const double *q, int n, double *impuls
                 if (active[i]) place[size++] = i;
             for (int i = 0; i < size; i++) {
                 wanted[i] = -b[place[i]];
-                for (int k = 0; k < size; k++) part[i * size + k] = V[place[i] * n + place[k]];
+                for (int k = 0; k < size; k++) {
+                    wanted[i] -= V[place[i] * n + place[k]] * impulses[place[k]];
+                    part[i * size + k] = V[place[i] * n + place[k]] + (i == k ? 1e-10 : 0.0);
+                }
             }
             solve(size, part, 1, wanted);
-            for (int i = 0; i < size; i++)
-                if (wanted[i] <= 0.0) {
-                    pulls = 1;
-                    share = fmin(share, impulses[place[i]] / fmax(impulses[place[i]] - wanted[i], 1e-300));
-                }
+            for (int i = 0; i < size; i++) {
+                wanted[i] += impulses[place[i]];
+                if (wanted[i] > 0.0) continue;
+                pulls = 1;
+                share = fmin(share, impulses[place[i]] / fmax(impulses[place[i]] - wanted[i], 1e-300));
+            }
             for (int i = 0; i < size; i++) {
                 const int k = place[i];
                 impulses[k] += pulls ? share * (wanted[i] - impulses[k]) : wanted[i] - impulses[k];

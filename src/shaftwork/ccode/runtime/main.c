@@ -1,7 +1,7 @@
 /* A run of @TITLE@: outputs at equal times as CSV.
  *
- *     cc -std=c99 -O2 -o run NAME.c main.c -lm && ./run > motion.csv        adaptive steps, Dormand and Prince
- *     ./run 1e-4 > motion.csv                                              fixed steps of 1e-4 s, Runge and Kutta
+ *     cc -std=c99 -O2 -o run NAME.c main.c -lm && ./run > motion.csv        steps by a tolerance
+ *     ./run 1e-3 > motion.csv                                              fixed steps of 1e-3 s
  */
 #include <stdio.h>
 #include <stdlib.h>
@@ -29,7 +29,7 @@ int main(int count, char **arguments)
     printf("\n");
     for (int row = 0; row <= rows && fault >= 0; row++) {
         const double t = t_end * row / rows;
-        while (step > 0.0 && m.t + 0.5 * step < t && fault >= 0) fault = NAME_step_rk4(&m, step);
+        while (step > 0.0 && m.t + 0.5 * step < t && fault >= 0) fault = NAME_step(&m, step);
         if (!(step > 0.0)) fault = NAME_integrate(&m, t, 1e-8);
         if (fault >= 0) print_row(&m);
     }

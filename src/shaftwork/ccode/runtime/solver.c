@@ -69,17 +69,8 @@ static double first_step(const NAME *m, const double *f, const double *scale, do
 static double try_step(const NAME *m, double h, double rtol, double k[16][NX], double *z)
 {
     double e3 = 0.0, e5 = 0.0;
-    STAGE(1);
-    STAGE(2);
-    STAGE(3);
-    STAGE(4);
-    STAGE(5);
-    STAGE(6);
-    STAGE(7);
-    STAGE(8);
-    STAGE(9);
-    STAGE(10);
-    STAGE(11);
+    STAGE(1); STAGE(2); STAGE(3); STAGE(4); STAGE(5); STAGE(6);
+    STAGE(7); STAGE(8); STAGE(9); STAGE(10); STAGE(11);
     for (int i = 0; i < NX; i++) {
         z[i] = m->x[i] + h * (SOLUTION(k, i));
         const double scale = rtol * (NOMINAL[i] + fmax(fabs(m->x[i]), fabs(z[i])));
@@ -94,9 +85,7 @@ static double try_step(const NAME *m, double h, double rtol, double k[16][NX], d
 static void interpolant(const NAME *m, double h, double k[16][NX], const double *end, double F[7][NX])
 {
     double z[NX];
-    STAGE(13);
-    STAGE(14);
-    STAGE(15);
+    STAGE(13); STAGE(14); STAGE(15);
     for (int i = 0; i < NX; i++) {
         const double change = end[i] - m->x[i];
         F[0][i] = change;
@@ -250,44 +239,17 @@ int NAME_integrate(NAME *m, double t_end, double rtol)
     return 0;
 }
 
-/* The states after one step of the classical method of Runge and Kutta. */
-static void rk4(const NAME *m, double h, double *x)
-{
-    double k[4][NX], z[NX];
-    NAME_rhs(m, m->t, m->x, k[0]);
-    for (int i = 0; i < NX; i++) z[i] = m->x[i] + 0.5 * h * k[0][i];
-    NAME_rhs(m, m->t + 0.5 * h, z, k[1]);
-    for (int i = 0; i < NX; i++) z[i] = m->x[i] + 0.5 * h * k[1][i];
-    NAME_rhs(m, m->t + 0.5 * h, z, k[2]);
-    for (int i = 0; i < NX; i++) z[i] = m->x[i] + h * k[2][i];
-    NAME_rhs(m, m->t + h, z, k[3]);
-    for (int i = 0; i < NX; i++) x[i] = m->x[i] + h / 6.0 * (k[0][i] + 2.0 * (k[1][i] + k[2][i]) + k[3][i]);
-}
-
-int NAME_step_rk4(NAME *m, double h)
+int NAME_step(NAME *m, double h)
 {
     const double end = m->t + h;
-    double x[NX];
+    double k[16][NX], z[NX];
     for (int n = 0; n < 100 && m->t < end; n++) {
-        int which = -1;
-        const double stop = fmin(end, m->next), whole = stop - m->t;
-        double low = 0.0, high = whole;
-        rk4(m, whole, x);
-        const int meets_guard = farthest(m, stop, x, &which) > 0.0;
-        for (int halves = 0; meets_guard && halves < 50; halves++) {
-            const double part = 0.5 * (low + high);
-            rk4(m, part, x);
-            if (farthest(m, m->t + part, x, &which) > 0.0) high = part;
-            else low = part;
-        }
-        if (meets_guard) rk4(m, high, x);
-        if (meets_guard) (void)farthest(m, m->t + high, x, &which);
-        m->t = high < whole ? m->t + high : stop;
-        for (int i = 0; i < NX; i++) m->x[i] = x[i];
+        const double stop = fmin(end, m->next), left = stop - m->t;
+        NAME_rhs(m, m->t, m->x, k[0]);
+        (void)try_step(m, left, 1.0, k, z);
+        NAME_rhs(m, stop, z, k[12]);
         m->steps++;
-        if (!meets_guard && m->t < m->next) continue;
-        m->met = meets_guard ? which : -1;
-        const int what = NAME_event(m);
+        const int what = advance(m, left, stop, k, z);
         if (what < 0) return what;
     }
     return m->t < end ? (m->fault = NAME_TOO_MANY_EVENTS) : 0;
