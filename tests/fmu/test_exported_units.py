@@ -86,6 +86,41 @@ def test_the_description_says_what_depends_on_what(unit: Units, version: str) ->
     assert read["shaft.tau"] == {"J1.omega", "J2.omega", "shaft.tau_c"}
 
 
+@pytest.mark.parametrize("version", VERSIONS)
+def test_the_description_tells_bounds_and_usual_sizes(unit: Units, version: str) -> None:
+    """The size of a torque is that of the impedance: sqrt(stiffness * median inertia) at a speed of 1 rad/s."""
+    description = fmpy.read_model_description(str(unit(version)))
+    variables = {variable.name: variable for variable in description.modelVariables}
+    assert [float(variables[name].min) for name in ("J1.J", "shaft.c", "shaft.d")] == [0.0, 0.0, 0.0]
+    assert (variables["shaft.c"].max, variables["J2.omega"].min, variables["J2.omega"].nominal) == (None, None, None)
+    impedance = np.sqrt(50.0 * 2.25)
+    assert float(variables["shaft.tau_c"].nominal) == pytest.approx(impedance, rel=1e-12)
+    assert float(variables["motor.tau"].nominal) == 10.0
+    sizes = {"J1.omega": 1.0, "J2.omega": 1.0, "shaft.tau_c": impedance}
+    with instances(unit(version), "ModelExchange") as (one,):
+        one.begin()
+        names = [str(unknown.variable.derivative.name) for unknown in description.derivatives]
+        assert one.nominals() == pytest.approx([sizes[name] for name in names], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("law", "first"),
+    [
+        (10.0 - 2.0 * sw.omega, 10.0),
+        (sw.Table([0.0, 1.0], [3.0, 5.0])(sw.t), 3.0),
+        (sw.Table([0.0, 9.0], [4.0, 0.0])(sw.omega), 4.0),
+        (4.0 + sw.Step(-7.0, 0.5), 4.0),
+        (sw.Step(5.0, 0.0), 5.0),
+        (2.0 * sw.phi, 0.0),
+    ],
+)
+def test_an_input_starts_at_the_first_value_of_its_law(tmp_path: Path, law: object, first: float) -> None:
+    two_masses(law).compile().to_fmu(tmp_path / "unit.fmu", inputs=["motor.tau"], binary=False)
+    description = fmpy.read_model_description(str(tmp_path / "unit.fmu"))
+    (variable,) = (variable for variable in description.modelVariables if variable.name == "motor.tau")
+    assert float(variable.start) == first
+
+
 def test_names_that_are_no_identifiers_are_flat(tmp_path: Path) -> None:
     net = sw.Network("Zahnräder & Wellen <1>")
     net.add(sw.TorqueSource("Motor 1", tau=1.0), "Welle 1")

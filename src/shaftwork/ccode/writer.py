@@ -19,6 +19,7 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import SignalError
 from shaftwork.formulation.form import Names
 from shaftwork.network.netlist import listed
+from shaftwork.pipeline.arguments import NOMINAL
 
 if TYPE_CHECKING:
     from shaftwork.ccode.mode_tables import ModeTables
@@ -42,11 +43,13 @@ class Variable(NamedTuple):
         name: in the network.
         unit: its unit, in SI.
         value: the default of a parameter or an input; of other variables 0.
+        nominal: the usual size of a state, at a speed of one; of other variables 1.
     """
 
     name: str
     unit: str
     value: float = 0.0
+    nominal: float = 1.0
 
 
 class CodeWriter:
@@ -99,7 +102,8 @@ class CodeWriter:
     def states(self) -> tuple[Variable, ...]:
         """The states of all sets."""
         units = {state.name: state.unit for one in self.sets for state in one.form.states}
-        return tuple(Variable(name, unit) for name, unit in units.items())
+        tolerances = ChainMap(*(dict(one.nominal) for one in self.sets))
+        return tuple(Variable(name, unit, nominal=tolerances[name] / NOMINAL) for name, unit in units.items())
 
     @cached_property
     def stores(self) -> tuple[str, ...]:
@@ -167,7 +171,7 @@ class CodeWriter:
         return "\n".join(
             [
                 runtime("head.c"),
-                self._nominal,
+                array("const double", "NOMINAL", [repr(NOMINAL * state.nominal) for state in self.states]),
                 *tables,
                 *map(runtime, helpers),
                 text,
@@ -185,11 +189,6 @@ class CodeWriter:
                 self._init,
             ]
         )
-
-    @property
-    def _nominal(self) -> str:
-        nominal = ChainMap(*(dict(one.nominal) for one in self.sets))
-        return array("const double", "NOMINAL", [repr(nominal[variable.name]) for variable in self.states])
 
     @property
     def _init(self) -> str:
