@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 from collections import ChainMap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
-from sympy import Expr, Integer, Piecewise
+from sympy import Expr, Float, Integer, Piecewise
 
 from shaftwork.ccode.c_printing import Statements, array, function, text_of
-from shaftwork.ccode.c_texts import dispatcher, runtime
+from shaftwork.ccode.c_texts import runtime
 from shaftwork.ccode.equation_set import EquationSet
-from shaftwork.ccode.set_functions import SetFunctions
+from shaftwork.ccode.set_functions import SetFunctions, functions_of_sets
 from shaftwork.codegen.state_transfer import WITHOUT_INERTIA, StateTransfer
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH
 from shaftwork.components.laws import t as TIME
@@ -132,21 +132,19 @@ class ModeTables:
 
     def texts(self, functions: Sequence[SetFunctions], statements: Statements) -> list[str]:
         """The functions and tables of all sets."""
-        x = "const double *restrict x"
         texts = [runtime("modes.c"), *self._tables()]
-        for one, guards in zip(functions, self._guards, strict=True):
-            texts += [*self._of_set(one, guards)]
-        arguments = {"guards": "g", "across": "speeds", "begins": "holds", "masses": "mass", "shares": "gains"}
-        texts += [dispatcher(name, (x, f"double *restrict {into}"), len(functions)) for name, into in arguments.items()]
+        assignments = [self._assignments(*pair) for pair in zip(functions, self._guards, strict=True)]
+        results = {"guards": "g", "across": "speeds", "begins": "holds", "masses": "mass", "shares": "gains"}
+        for name, into in results.items():
+            arguments = ("const double *restrict x", f"double *restrict {into}")
+            texts += functions_of_sets(name, arguments, [one[name] for one in assignments], statements)
         return [*texts, self._leave_numbers(functions[0], statements)]
 
-    def _of_set(self, one: SetFunctions, guards: ModeGuards) -> Iterator[str]:
-        """The functions of a set: guards, speeds across machines, where motions begin, and answers to impulses."""
-        x, machines, size = "const double *restrict x, ", enumerate(self._machines), self._most_modes
+    def _assignments(self, one: SetFunctions, guards: ModeGuards) -> Mapping[str, Mapping[str, Expr]]:
+        """Of a set: guards, speeds across machines, where motions begin, and answers to impulses."""
+        machines, size = enumerate(self._machines), self._most_modes
         parts = {part.name: part for part in one.form.graph.parts}
-        fewer = [f"g[{k}] = 0.0;" for k in range(len(guards.expressions), self.most_guards)]
-        lines = one.assigned(self._numbered("g", len(guards.expressions)), guards.expressions)
-        yield one.written("guards", f"{x}double *restrict g", [*lines, *fewer])
+        fewer = [Float(0.0)] * (self.most_guards - len(guards.expressions))
         speeds, begins = list[Expr](), dict[str, Expr]()
         for k, machine in machines:
             part = parts[machine.part.name]
@@ -154,17 +152,13 @@ class ModeTables:
             for n, mode in enumerate(machine.modes.options):
                 condition = Piecewise((Integer(1), mode.starts), (Integer(0), True))
                 begins[f"holds[{k * size + n}]"] = one.observables.guard(part, machine.modes, condition)
-        yield one.written(
-            "across", f"{x}double *restrict speeds", [*one.assigned(self._numbered("speeds", len(speeds)), speeds)]
-        )
-        yield one.written("begins", f"{x}double *restrict holds", [*one.assigned([*begins], [*begins.values()])])
-        yield one.mass("masses") if one.form.across_states else one.written("masses", f"{x}double *restrict mass", [])
-        gains = dict(self._gains(one, speeds))
-        yield one.written("shares", f"{x}double *restrict gains", [*one.assigned([*gains], [*gains.values()])])
-
-    @staticmethod
-    def _numbered(name: str, count: int) -> list[str]:
-        return [f"{name}[{k}]" for k in range(count)]
+        return {
+            "guards": {f"g[{k}]": guard for k, guard in enumerate((*guards.expressions, *fewer))},
+            "across": {f"speeds[{k}]": speed for k, speed in enumerate(speeds)},
+            "begins": begins,
+            "masses": one.mass(),
+            "shares": dict(self._gains(one, speeds)),
+        }
 
     def _gains(self, one: SetFunctions, speeds: Sequence[Expr]) -> Iterator[tuple[str, Expr]]:
         """What the speed across each machine has of that of each inertia; nothing where torques tell it as well."""

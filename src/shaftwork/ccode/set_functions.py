@@ -9,6 +9,7 @@ from functools import cached_property
 from sympy import Add, Expr, Integer, Symbol
 
 from shaftwork.ccode.c_printing import Statements, function
+from shaftwork.ccode.c_texts import dispatcher
 from shaftwork.ccode.equation_set import EquationSet
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.law_slopes import slope
@@ -61,12 +62,16 @@ class SetFunctions:
         return bool(self.form.dependent_through and self.form.through_states)
 
     @cached_property
+    def assignments(self) -> Mapping[str, Mapping[str, Expr]]:
+        """By the name of a function what it assigns, target to expression."""
+        outputs = {f"y[{k}]": self.observables.quantity(name) for k, name in enumerate(self.layout.outputs)}
+        stored = {f"stored[{k}]": self.observables.store(name) for k, name in enumerate(self.layout.stores)}
+        return {"rates": self._rates(), "jacobian": self._jacobian(), "outputs": outputs, "stores": stored}
+
+    @cached_property
     def text(self) -> str:
-        """All functions."""
-        parts = [self._rates(), self._jacobian(), self._outputs(), self._stores()]
-        parts += [self.mass()] if self._ties else []
-        parts += [self._take_up()]
-        return "\n".join(parts)
+        """The functions that no other set shares."""
+        return "\n".join([self._mass(), self._take_up()] if self._ties else [self._take_up()])
 
     def written(self, name: str, arguments: str, lines: Sequence[str]) -> str:
         """A function of this set: its name ends with the number of the set."""
@@ -76,26 +81,12 @@ class SetFunctions:
         """Lines that assign expressions to targets."""
         return self.layout.statements.assigned(targets, expressions)
 
-    def _rates(self) -> str:
-        expressions = list(self.rows.rates)
-        targets = [f"dx[{place}]" for place in self.places]
-        for name in self.layout.states:
-            if name in self._dependent:  # so that all states of a motion have rates in all of its modes
-                targets.append(f"dx[{self.layout.states.index(name)}]")
-                expressions.append(self._dependent[name])
-        return self.written(
-            "rates", "const double *restrict x, double *restrict dx", [*self.assigned(targets, expressions)]
-        )
-
-    @cached_property
-    def _dependent(self) -> Mapping[str, Expr]:
-        """The rates of what is stored and no state here, by name."""
-        names = [name for name in self.layout.states if name not in {state.name for state in self.form.states}]
-        return {
-            name: self._store_rate(branch)
-            for name, branch in StateTransfer(self.form).branches.items()
-            if name in names
-        }
+    def _rates(self) -> Mapping[str, Expr]:
+        """The rates of the states, and of what is stored and no state here: all have some in all modes."""
+        rates = {f"dx[{place}]": rate for place, rate in zip(self.places, self.rows.rates, strict=True)}
+        branches = StateTransfer(self.form).branches
+        others = {name: k for k, name in enumerate(self.layout.states) if k not in self.places and name in branches}
+        return rates | {f"dx[{k}]": self._store_rate(branches[name]) for name, k in others.items()}
 
     def _store_rate(self, number: int) -> Expr:
         """The rate of the speed of an inertia, or of the torque of a spring, that follows others."""
@@ -105,32 +96,16 @@ class SetFunctions:
         part, (first, second) = self.form.graph.parts[branch.part], branch.template.ends
         return law * (self.observables.across(part, first) - self.observables.across(part, second))
 
-    def _jacobian(self) -> str:
-        targets, slopes, size = list[str](), list[Expr](), len(self.layout.states)
-        for row, rate in zip(self.places, self.rows.rates, strict=True):
-            for column, state in zip(self.places, self.rows.states, strict=True):
-                if rate.has(state):
-                    targets.append(f"slopes[{row * size + column}]")
-                    slopes.append(slope(rate, state))
-        return self.written(
-            "jacobian", "const double *restrict x, double *restrict slopes", [*self.assigned(targets, slopes)]
-        )
+    def _jacobian(self) -> Mapping[str, Expr]:
+        size, states = len(self.layout.states), list(zip(self.places, self.rows.states, strict=True))
+        return {
+            f"slopes[{row * size + column}]": slope(rate, state)
+            for row, rate in zip(self.places, self.rows.rates, strict=True)
+            for column, state in states
+            if rate.has(state)
+        }
 
-    def _outputs(self) -> str:
-        expressions = [self.observables.quantity(name) for name in self.layout.outputs]
-        targets = [f"y[{k}]" for k in range(len(expressions))]
-        return self.written(
-            "outputs", "const double *restrict x, double *restrict y", [*self.assigned(targets, expressions)]
-        )
-
-    def _stores(self) -> str:
-        expressions = [self.observables.store(name) for name in self.layout.stores]
-        targets = [f"stored[{k}]" for k in range(len(expressions))]
-        return self.written(
-            "stores", "const double *restrict x, double *restrict stored", [*self.assigned(targets, expressions)]
-        )
-
-    def mass(self, name: str = "mass") -> str:
+    def mass(self) -> Mapping[str, Expr]:
         """C + Q K F': the inertias of the states with all that turns with them, an array (n, n) of zeros before."""
         form, n = self.form, len(self.form.across_states)
         entries = {(k, k): form.law_of(branch) for k, branch in enumerate(form.across_states)}
@@ -139,10 +114,12 @@ class SetFunctions:
             for (first, share), (second, gain) in ((one, other) for one in cutset for other in loop):
                 at = form.across_states.index(first), form.across_states.index(second)
                 entries[at] = entries.get(at, Integer(0)) + share * form.law_of(link) * gain
-        targets = [f"mass[{row * n + column}]" for row, column in entries]
-        return self.written(
-            name, "const double *restrict x, double *restrict mass", [*self.assigned(targets, [*entries.values()])]
-        )
+        return {f"mass[{row * n + column}]": entry for (row, column), entry in entries.items()}
+
+    def _mass(self) -> str:
+        rows = self.mass()
+        lines = self.assigned([*rows], [*rows.values()])
+        return self.written("mass", "const double *restrict x, double *restrict mass", [*lines])
 
     def _row(self, rows: Mapping[int, Row], link: int) -> list[tuple[int, Expr]]:
         """Gains of states of speed in the loop or the cutset of a link."""
@@ -211,6 +188,38 @@ class SetFunctions:
 
     def _stored(self, branch: int) -> Expr:
         return stored_symbol(store_name(self.form.graph, self.form.graph.branches[branch]))
+
+
+def functions_of_sets(
+    name: str, arguments: Sequence[str], sets: Sequence[Mapping[str, Expr]], statements: Statements
+) -> Iterator[str]:
+    """A function of each set of equations, and the one that calls that of the set of an instance.
+
+    Rows that several sets have in common stand in one function that theirs call.
+
+    Args:
+        name: of the functions.
+        arguments: of theirs behind instance and time.
+        sets: what each of them assigns, target to expression.
+        statements: writes expressions.
+    """
+    call = ", ".join(("m", "t", *(argument.split("*restrict ")[-1] for argument in arguments)))
+    sharers: dict[tuple[str, Expr], list[int]] = {}
+    for number, one in enumerate(sets):
+        for row in one.items():
+            sharers.setdefault(row, []).append(number)
+    groups: dict[tuple[int, ...], dict[str, Expr]] = {}
+    for (target, expression), numbers in sharers.items():
+        groups.setdefault(tuple(numbers), {})[target] = expression
+    lines: dict[str, list[str]] = {f"{name}_{number}": [] for number in range(len(sets))}
+    for k, (numbers, rows) in enumerate(groups.items()):
+        where = f"{name}_shared_{k}" if len(numbers) > 1 else f"{name}_{numbers[0]}"
+        for number in numbers if len(numbers) > 1 else ():
+            lines[f"{name}_{number}"].append(f"{where}({call});")
+        lines.setdefault(where, []).extend(statements.assigned([*rows], [*rows.values()]))
+    head = f"(const NAME *m, double t, {', '.join(arguments)})"
+    yield from (function(f"void {which}{head}", text) for which, text in reversed(lines.items()))
+    yield dispatcher(name, arguments, len(sets))
 
 
 def stored_symbol(name: str) -> Symbol:

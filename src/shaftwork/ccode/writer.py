@@ -13,7 +13,7 @@ from shaftwork.ccode.c_printing import Statements, array
 from shaftwork.ccode.c_texts import dispatcher, filled, names_of, runtime
 from shaftwork.ccode.equation_set import EquationSet
 from shaftwork.ccode.instants import Instants
-from shaftwork.ccode.set_functions import ArrayLayout, SetFunctions, stored_symbol
+from shaftwork.ccode.set_functions import ArrayLayout, SetFunctions, functions_of_sets, stored_symbol
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import SignalError
@@ -31,7 +31,6 @@ DISPATCHED = {
     "jacobian": ("const double *restrict x", "double *restrict slopes"),
     "outputs": ("const double *restrict x", "double *restrict y"),
     "stores": ("const double *restrict x", "double *restrict stored"),
-    "take_up": ("const double *restrict stored", "double *restrict x"),
 }
 """Functions of which each set of equations has its own, and their arguments behind instance and time."""
 
@@ -155,8 +154,11 @@ class CodeWriter:
         layout = ArrayLayout(states, self.stores, outputs, statements)
         functions = [SetFunctions(number, one, layout) for number, one in enumerate(self.sets)]
         still = [symbol for symbol, code in self._names.items() if code.startswith(("m->p", "m->u"))]
-        body = [one.text for one in functions]
-        body += [dispatcher(name, arguments, len(functions)) for name, arguments in DISPATCHED.items()]
+        body = list[str]()
+        for name, arguments in DISPATCHED.items():
+            body += functions_of_sets(name, arguments, [one.assignments[name] for one in functions], statements)
+        body += [one.text for one in functions]
+        body.append(dispatcher("take_up", _TAKE_UP, len(functions)))
         body += modes.texts(functions, statements) if modes else [_NO_GUARDS]
         body.append(Instants(self._model.form.graph, still).text(statements))
         text = "\n".join(body)
@@ -209,6 +211,7 @@ _INIT = """void NAME_init(NAME *m)
     memset(m, 0, sizeof *m);
     m->look_ahead = 1e-6;
     m->most_steps = 1000000;"""
+_TAKE_UP = ("const double *restrict stored", "double *restrict x")
 _NO_GUARDS = """static void guards(const NAME *m, double t, const double *x, double *g)
 {
     (void)m;

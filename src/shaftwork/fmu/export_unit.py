@@ -33,6 +33,8 @@ _KINDS = {"both": KINDS, "model exchange": KINDS[:1], "co-simulation": KINDS[1:]
 _SYSTEMS = {"Linux": "linux", "Darwin": "darwin", "Windows": "windows"}
 _MACHINES = {"amd64": "x86_64", "arm64": "aarch64", "i686": "x86"}
 _EXTENSIONS = {"Linux": ".so", "Darwin": ".dylib", "Windows": ".dll"}
+SMALL = ("-ffunction-sections", "-fdata-sections", "-fno-asynchronous-unwind-tables", "-fno-math-errno")
+"""Options of the compiler that leave out what an FMU does not use: code of other uses, tables and `errno`."""
 _DAY = (1980, 1, 1, 0, 0, 0)  # of all files in the archive: the same network gives the same bytes
 
 
@@ -198,7 +200,8 @@ def _binary(name: str, texts: Mapping[str, str], version: str) -> dict[str, byte
         for file, text in texts.items():
             (Path(folder) / file).write_text(text, encoding="utf-8")
         sources = [file for file in texts if file.endswith(".c")]
-        options = ["-std=c99", "-O2", "-shared", "-fPIC", "-fvisibility=hidden", "-s"]
+        options = ["-std=c99", "-O2", "-shared", "-fPIC", "-fvisibility=hidden", "-s", *SMALL]
+        options += ["-Wl,--gc-sections"] if system == "Linux" else []
         options.append("-Werror=implicit-function-declaration")  # else what is missing shows where the unit is loaded
         done = subprocess.run(  # noqa: S603 (the compiler of this machine, on code made here)
             [compiler, *options, "-o", library, *sources, "-lm"],
