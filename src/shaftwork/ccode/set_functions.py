@@ -195,7 +195,8 @@ def functions_of_sets(
 ) -> Iterator[str]:
     """A function of each set of equations, and the one that calls that of the set of an instance.
 
-    Rows that several sets have in common stand in one function that theirs call.
+    Rows that half of the sets or more have in common stand in one function that theirs call. Rows of fewer sets stay
+    with the others of their set: what they have in common with those, such as a sine, is then evaluated once.
 
     Args:
         name: of the functions.
@@ -210,7 +211,9 @@ def functions_of_sets(
             sharers.setdefault(row, []).append(number)
     groups: dict[tuple[int, ...], dict[str, Expr]] = {}
     for (target, expression), numbers in sharers.items():
-        groups.setdefault(tuple(numbers), {})[target] = expression
+        together = [tuple(numbers)] if 2 * len(numbers) >= len(sets) else [(number,) for number in numbers]
+        for sharing in together:
+            groups.setdefault(sharing, {})[target] = expression
     lines: dict[str, list[str]] = {f"{name}_{number}": [] for number in range(len(sets))}
     for k, (numbers, rows) in enumerate(groups.items()):
         where = f"{name}_shared_{k}" if len(numbers) > 1 else f"{name}_{numbers[0]}"

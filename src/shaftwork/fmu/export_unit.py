@@ -123,7 +123,7 @@ def _interface(model: Model, code: CCode, outputs: Sequence[str] | None, t_end: 
 
 
 def _bounded(model: Model, variable: Variable, nominal: float) -> UnitVariable:
-    """A parameter or an input with the bounds that its part declares; FMI has no bounds that are excluded themselves."""
+    """A parameter or an input with the bounds that its part declares; those of FMI are inclusive."""
     owner, _, name = variable.name.rpartition(".")
     part = next(part for part in model.form.graph.parts if part.name == owner)
     limits = part.component.declared.get(name)
@@ -143,7 +143,7 @@ def _sources(unit: UnitInterface, code: CCode, version: str) -> dict[str, str]:
     folder = files("shaftwork.fmu") / "sources"
     layer = f"fmi{version[0]}.c"
     texts = {f"{code.name}.c": code.source}
-    texts |= {name: (folder / name).read_text(encoding="utf-8") for name in ("unit.c", layer, "unit.h")}
+    texts |= {name: (folder / name).read_text(encoding="utf-8") for name in ("unit.c", layer, "unit.h", "unit_api.inc")}
     return {**texts, f"{code.name}.h": code.header, "unit_config.h": _configuration(unit, code)}
 
 

@@ -155,8 +155,8 @@ class FMU:
         exponents, factor, offset = self._in_base_units(unit)
         if exponents != base_unit(_SI[what])[0] or offset or factor == 0.0 or not math.isfinite(factor):
             raise ParameterError(
-                f"FMU '{self.path.name}': {what} names '{name}', whose unit '{unit}' does not agree with '{_SI[what]}'. "
-                "Name a variable of that quantity, or give its unit a BaseUnit in modelDescription.xml."
+                f"FMU '{self.path.name}': {what} names '{name}', whose unit '{unit}' does not agree with "
+                f"'{_SI[what]}'. Name a variable of that quantity, or give its unit a BaseUnit in modelDescription.xml."
             )
         return factor
 
@@ -187,7 +187,8 @@ class FMU:
 class ForeignUnit:
     """One instance of an FMU as a pure function: time, states and input to the rates of the states and the output.
 
-    Input and output are in SI. The states are counted from those that it starts with, as all that a network stores is zero at rest.
+    Input and output are in SI. The states are counted from those that it starts with, as all that a network stores is
+    zero at rest.
 
     Args:
         fmu: the file with its values.
