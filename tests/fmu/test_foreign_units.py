@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import copy
 import pickle
 import shutil
 import zipfile
@@ -159,6 +160,18 @@ def test_networks_with_units_travel(spring: Path) -> None:
     net = with_spring(spring)
     again = pickle.loads(pickle.dumps(net))  # noqa: S301 (of our own making)
     assert (again.simulate(0.2)["J1.omega"] == net.simulate(0.2)["J1.omega"]).all()
+
+
+def test_a_motion_with_a_unit_is_stored_without_a_file_that_names_it(spring: Path, tmp_path: Path) -> None:
+    motion = with_spring(spring).simulate(0.2)
+    for again in (pickle.loads(pickle.dumps(motion)), copy.deepcopy(motion)):  # noqa: S301 (of our own making)
+        assert again["rest.tau"][-1] == motion["rest.tau"][-1]
+    for name in ("motion.nc", "motion.parquet"):
+        with pytest.raises(
+            sw.ModelFileError, match=r"FMUTorque 'rest' cannot be saved: fmu .*pickle it, or.*to_pandas"
+        ):
+            motion.save(tmp_path / name)
+    assert list(motion.to_pandas("rest.tau").columns) == ["rest.tau"]
 
 
 def test_a_law_outside_is_evaluated_for_arrays_as_for_numbers(spring: Path) -> None:

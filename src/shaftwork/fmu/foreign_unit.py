@@ -85,7 +85,8 @@ class FMU:
         """
         raise ParameterError(
             "an FMU is a program that would run in this process, and no text in a file may ask for that. Build the "
-            "part in a script, with fmu=sw.FMU('file.fmu', speed=..., torque=...)"
+            "part in a script, with fmu=sw.FMU('file.fmu', speed=..., torque=...). To store a motion with it, pickle "
+            "it, or take its numbers with to_pandas() or to_xarray()"
         )
 
     @cached_property
@@ -207,11 +208,11 @@ class ForeignUnit:
     def __reduce__(self) -> tuple[Any, ...]:
         return ForeignUnit, (self._fmu, self._reads, self._gives)
 
-    def value(self, row: int, arguments: tuple[float, ...]) -> float:
-        """The rate of state `row`, or the output behind the last one.
+    def value(self, output: int, arguments: tuple[float, ...]) -> float:
+        """The rate of a state, or behind the last of them what the unit gives.
 
         Args:
-            row: number of the state.
+            output: index of the state.
             arguments: time in s, states, and the input.
 
         Raises:
@@ -220,7 +221,7 @@ class ForeignUnit:
         with self._lock:
             if arguments != self._last[0]:
                 self._last = arguments, self._evaluated(*arguments)
-            return self._last[1][row]
+            return self._last[1][output]
 
     def _evaluated(self, t: float, *numbers: float) -> list[float]:
         try:
