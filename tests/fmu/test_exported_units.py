@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 import subprocess
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from random import Random
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -374,6 +377,24 @@ def test_our_own_unit_is_a_part_of_a_network(tmp_path: Path) -> None:
     whole.add(sw.Inertia("J2", J=3.0), "wheel")
     motion = net.simulate(2.0, rtol=1e-10)
     np.testing.assert_allclose(motion["J1.omega"], whole.simulate(2.0, rtol=1e-10)["J1.omega"], atol=1e-7)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_description_with_wrong_attributes_is_read_or_refused_by_name(
+    unit: Units, version: str, tmp_path: Path
+) -> None:
+    chance, path = Random(1), tmp_path / "mutated.fmu"
+    with zipfile.ZipFile(unit(version)) as archive:
+        text = archive.read("modelDescription.xml")
+    values = ("", "0", "-1", "1e400", "nan", "x", "true", "input", "output", "m/s", "99999")
+    for _ in range(40):
+        root = ElementTree.fromstring(text)  # noqa: S314 (of our own making)
+        element = chance.choice([one for one in root.iter() if one.attrib])
+        element.set(chance.choice(list(element.attrib)), chance.choice(values))
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("modelDescription.xml", ElementTree.tostring(root))
+        with contextlib.suppress(sw.ParameterError):
+            assert len(sw.FMU(path, speed="J1.omega", torque="motor.tau").states) <= 3
 
 
 def test_a_folder_is_no_place_for_a_unit(tmp_path: Path) -> None:

@@ -215,9 +215,9 @@ def functions_of_sets(
         for sharing in together:
             groups.setdefault(sharing, {})[target] = expression
     lines: dict[str, list[str]] = {f"{name}_{number}": [] for number in range(len(sets))}
-    for k, (numbers, rows) in enumerate(groups.items()):
-        where = f"{name}_shared_{k}" if len(numbers) > 1 else f"{name}_{numbers[0]}"
-        for number in numbers if len(numbers) > 1 else ():
+    for k, (sharing, rows) in enumerate(groups.items()):
+        where = f"{name}_shared_{k}" if len(sharing) > 1 else f"{name}_{sharing[0]}"
+        for number in sharing if len(sharing) > 1 else ():
             lines[f"{name}_{number}"].append(f"{where}({call});")
         lines.setdefault(where, []).extend(statements.assigned([*rows], [*rows.values()]))
     head = f"(const NAME *m, double t, {', '.join(arguments)})"
