@@ -44,7 +44,8 @@ int fmi2SetContinuousStates(void *c, const double *x, size_t n) { memcpy(((Unit 
 int fmi2GetDerivatives(void *c, double *d, size_t n) { for (size_t i = 0; i < n; i++) d[i] = rate(c, i); return 0; }
 int fmi2GetEventIndicators(void *c, double *z, size_t n) { return 0; }
 int fmi2GetContinuousStates(void *c, double *x, size_t n) { memcpy(x, ((Unit *)c)->x, 8 * n); return 0; }
-int fmi2GetNominalsOfContinuousStates(void *c, double *x, size_t n) { for (size_t i = 0; i < n; i++) x[i] = 1; return 0; }
+int fmi2GetNominalsOfContinuousStates(void *c, double *x, size_t n)
+{ for (size_t i = 0; i < n; i++) x[i] = 1; return 0; }
 """
 
 _PARAMETER = '<ScalarVariable name="{}" valueReference="{}" causality="parameter" variability="fixed">'

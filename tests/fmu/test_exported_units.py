@@ -9,7 +9,7 @@ import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from random import Random
-from xml.etree import ElementTree
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
@@ -383,16 +383,16 @@ def test_our_own_unit_is_a_part_of_a_network(tmp_path: Path) -> None:
 def test_a_description_with_wrong_attributes_is_read_or_refused_by_name(
     unit: Units, version: str, tmp_path: Path
 ) -> None:
-    chance, path = Random(1), tmp_path / "mutated.fmu"
+    chance, path = Random(1), tmp_path / "mutated.fmu"  # noqa: S311 (no secret)
     with zipfile.ZipFile(unit(version)) as archive:
         text = archive.read("modelDescription.xml")
     values = ("", "0", "-1", "1e400", "nan", "x", "true", "input", "output", "m/s", "99999")
     for _ in range(40):
-        root = ElementTree.fromstring(text)  # noqa: S314 (of our own making)
+        root = ET.fromstring(text)  # noqa: S314 (of our own making)
         element = chance.choice([one for one in root.iter() if one.attrib])
         element.set(chance.choice(list(element.attrib)), chance.choice(values))
         with zipfile.ZipFile(path, "w") as archive:
-            archive.writestr("modelDescription.xml", ElementTree.tostring(root))
+            archive.writestr("modelDescription.xml", ET.tostring(root))
         with contextlib.suppress(sw.ParameterError):
             assert len(sw.FMU(path, speed="J1.omega", torque="motor.tau").states) <= 3
 
