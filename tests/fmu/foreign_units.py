@@ -40,11 +40,12 @@ int fmi2NewDiscreteStates(void *c, int *e) { memset(e, 0, 32); return 0; }
 int fmi2EnterContinuousTimeMode(void *c) { return 0; }
 int fmi2CompletedIntegratorStep(void *c, int a, int *e, int *t) { *e = *t = 0; return 0; }
 int fmi2SetTime(void *c, double t) { ((Unit *)c)->t = t; return FAILS; }
-int fmi2SetContinuousStates(void *c, const double *x, size_t n) { memcpy(((Unit *)c)->x, x, 16); return 0; }
-int fmi2GetDerivatives(void *c, double *d, size_t n) { d[0] = rate(c, 0); d[1] = rate(c, 1); return 0; }
+int fmi2SetContinuousStates(void *c, const double *x, size_t n) { memcpy(((Unit *)c)->x, x, 8 * n); return 0; }
+int fmi2GetDerivatives(void *c, double *d, size_t n) { for (size_t i = 0; i < n; i++) d[i] = rate(c, i); return 0; }
 int fmi2GetEventIndicators(void *c, double *z, size_t n) { return 0; }
-int fmi2GetContinuousStates(void *c, double *x, size_t n) { memcpy(x, ((Unit *)c)->x, 16); return 0; }
-int fmi2GetNominalsOfContinuousStates(void *c, double *x, size_t n) { x[0] = x[1] = 1; return 0; }
+int fmi2GetContinuousStates(void *c, double *x, size_t n) { memcpy(x, ((Unit *)c)->x, 8 * n); return 0; }
+int fmi2GetNominalsOfContinuousStates(void *c, double *x, size_t n)
+{ for (size_t i = 0; i < n; i++) x[i] = 1; return 0; }
 """
 
 _PARAMETER = '<ScalarVariable name="{}" valueReference="{}" causality="parameter" variability="fixed">'

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 import subprocess
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from random import Random
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
@@ -84,6 +87,41 @@ def test_the_description_says_what_depends_on_what(unit: Units, version: str) ->
     assert read["der(shaft.tau_c)"] == {"J1.omega", "J2.omega"}
     assert read["J2.omega"] == {"J2.omega"}
     assert read["shaft.tau"] == {"J1.omega", "J2.omega", "shaft.tau_c"}
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_the_description_tells_bounds_and_usual_sizes(unit: Units, version: str) -> None:
+    """The size of a torque is that of the impedance: sqrt(stiffness * median inertia) at a speed of 1 rad/s."""
+    description = fmpy.read_model_description(str(unit(version)))
+    variables = {variable.name: variable for variable in description.modelVariables}
+    assert [float(variables[name].min) for name in ("J1.J", "shaft.c", "shaft.d")] == [0.0, 0.0, 0.0]
+    assert (variables["shaft.c"].max, variables["J2.omega"].min, variables["J2.omega"].nominal) == (None, None, None)
+    impedance = np.sqrt(50.0 * 2.25)
+    assert float(variables["shaft.tau_c"].nominal) == pytest.approx(impedance, rel=1e-12)
+    assert float(variables["motor.tau"].nominal) == 10.0
+    sizes = {"J1.omega": 1.0, "J2.omega": 1.0, "shaft.tau_c": impedance}
+    with instances(unit(version), "ModelExchange") as (one,):
+        one.begin()
+        names = [str(unknown.variable.derivative.name) for unknown in description.derivatives]
+        assert one.nominals() == pytest.approx([sizes[name] for name in names], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("law", "first"),
+    [
+        (10.0 - 2.0 * sw.omega, 10.0),
+        (sw.Table([0.0, 1.0], [3.0, 5.0])(sw.t), 3.0),
+        (sw.Table([0.0, 9.0], [4.0, 0.0])(sw.omega), 4.0),
+        (4.0 + sw.Step(-7.0, 0.5), 4.0),
+        (sw.Step(5.0, 0.0), 5.0),
+        (2.0 * sw.phi, 0.0),
+    ],
+)
+def test_an_input_starts_at_the_first_value_of_its_law(tmp_path: Path, law: object, first: float) -> None:
+    two_masses(law).compile().to_fmu(tmp_path / "unit.fmu", inputs=["motor.tau"], binary=False)
+    description = fmpy.read_model_description(str(tmp_path / "unit.fmu"))
+    (variable,) = (variable for variable in description.modelVariables if variable.name == "motor.tau")
+    assert float(variable.start) == first
 
 
 def test_names_that_are_no_identifiers_are_flat(tmp_path: Path) -> None:
@@ -339,6 +377,24 @@ def test_our_own_unit_is_a_part_of_a_network(tmp_path: Path) -> None:
     whole.add(sw.Inertia("J2", J=3.0), "wheel")
     motion = net.simulate(2.0, rtol=1e-10)
     np.testing.assert_allclose(motion["J1.omega"], whole.simulate(2.0, rtol=1e-10)["J1.omega"], atol=1e-7)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_description_with_wrong_attributes_is_read_or_refused_by_name(
+    unit: Units, version: str, tmp_path: Path
+) -> None:
+    chance, path = Random(1), tmp_path / "mutated.fmu"  # noqa: S311 (no secret)
+    with zipfile.ZipFile(unit(version)) as archive:
+        text = archive.read("modelDescription.xml")
+    values = ("", "0", "-1", "1e400", "nan", "x", "true", "input", "output", "m/s", "99999")
+    for _ in range(40):
+        root = ET.fromstring(text)  # noqa: S314 (of our own making)
+        element = chance.choice([one for one in root.iter() if one.attrib])
+        element.set(chance.choice(list(element.attrib)), chance.choice(values))
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("modelDescription.xml", ET.tostring(root))
+        with contextlib.suppress(sw.ParameterError):
+            assert len(sw.FMU(path, speed="J1.omega", torque="motor.tau").states) <= 3
 
 
 def test_a_folder_is_no_place_for_a_unit(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import copy
 import pickle
 import shutil
 import zipfile
@@ -32,6 +33,31 @@ def spring(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def inertia(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return built(tmp_path_factory.mktemp("inertia") / "inertia.fmu", INERTIA, **SPEED)
+
+
+def in_units(path: Path, folder: Path, speed: str, torque: str) -> Path:
+    """The unit again, whose description tells units of its input and its output."""
+    bases = {
+        "rev/min": f's="-1" rad="1" factor="{np.pi / 30.0!r}"',
+        "deg/s": f's="-1" rad="1" factor="{np.pi / 180.0!r}"',
+        "°/min": f's="-1" rad="1" factor="{np.pi / 10_800.0!r}"',
+        "kN.m": 'kg="1" m="2" s="-2" factor="1000"',
+        "N.mm": 'kg="1" m="2" s="-2" factor="0.001"',
+        "°C": 'K="1" offset="273.15"',
+    }
+    bases = {unit: f"<BaseUnit {base}/>" for unit, base in bases.items()}
+    units = (f'<Unit name="{unit}">{bases.get(unit, "")}</Unit>' for unit in (speed, torque))
+    changed = folder / "units.fmu"
+    with zipfile.ZipFile(path) as source, zipfile.ZipFile(changed, "w") as target:
+        for name in source.namelist():
+            text = source.read(name)
+            if name == "modelDescription.xml":
+                words = text.decode().replace('causality="input"><Real', f'causality="input"><Real unit="{speed}"')
+                words = words.replace('causality="output"><Real', f'causality="output"><Real unit="{torque}"')
+                definitions = f"<UnitDefinitions>{''.join(units)}</UnitDefinitions>"
+                text = words.replace("<ModelVariables>", f"{definitions}<ModelVariables>").encode()
+            target.writestr(name, text)
+    return changed
 
 
 def driven(name: str = "two masses") -> sw.Network:
@@ -87,15 +113,65 @@ def test_the_gain_multiplies_the_torque(spring: Path) -> None:
     net = driven()
     net.add(sw.FMUTorque("rest", fmu=sw.FMU(spring, speed="u", torque="tau"), gain=-2.0), "rotor")
     motion, model = net.simulate(0.1), net.compile()
-    unit = ForeignUnit(FMU(spring, "u", "tau"), "u", "tau")
+    unit = ForeignUnit(FMU(spring, "u", "tau"), "speed", "torque")
     state = tuple(motion[name][-1] for name in model.states)
     assert motion["rest.tau"][-1] == pytest.approx(-2.0 * unit.value(2, (0.1, *state[1:], state[0])), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("speed", "torque", "speeds", "torques"),
+    [
+        ("rad/s", "N.m", 1.0, 1.0),
+        ("rev/min", "kN.m", np.pi / 30.0, 1e3),
+        ("deg/s", "N.mm", np.pi / 180.0, 1e-3),
+        ("°/min", "J", np.pi / 10_800.0, 1.0),
+    ],
+)
+def test_units_of_the_variables_are_converted(
+    spring: Path, tmp_path: Path, speed: str, torque: str, speeds: float, torques: float
+) -> None:
+    """The same binary, told to speak other units, takes smaller numbers and gives larger ones."""
+    path = in_units(spring, tmp_path, speed, torque)
+    converted = ForeignUnit(FMU(path, "u", "tau"), "speed", "torque").value(2, (0.0, 0.01, 0.2, 0.7))
+    plain = ForeignUnit(FMU(spring, "u", "tau"), "speed", "torque").value(2, (0.0, 0.01, 0.2, 0.7 / speeds))
+    assert converted == pytest.approx(torques * plain, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("speed", "torque", "message"),
+    [
+        ("m/s", "N.m", r"speed names 'u', whose unit 'm/s' does not agree with 'rad/s'"),
+        ("rad/s", "N", r"torque names 'tau', whose unit 'N' does not agree with 'N\*m'"),
+        ("rad", "N.m", "unit 'rad' does not agree"),
+        ("Hz", "N.m", "unit 'Hz' does not agree"),
+        ("rpm", "N.m", "unit 'rpm' does not agree.*BaseUnit"),
+        ("°C", "N.m", "unit '°C' does not agree"),
+    ],
+)
+def test_a_variable_of_another_quantity_is_refused(
+    spring: Path, tmp_path: Path, speed: str, torque: str, message: str
+) -> None:
+    path = in_units(spring, tmp_path, speed, torque)
+    with pytest.raises(sw.ParameterError, match=message):
+        sw.FMU(path, speed="u", torque="tau")
 
 
 def test_networks_with_units_travel(spring: Path) -> None:
     net = with_spring(spring)
     again = pickle.loads(pickle.dumps(net))  # noqa: S301 (of our own making)
     assert (again.simulate(0.2)["J1.omega"] == net.simulate(0.2)["J1.omega"]).all()
+
+
+def test_a_motion_with_a_unit_is_stored_without_a_file_that_names_it(spring: Path, tmp_path: Path) -> None:
+    motion = with_spring(spring).simulate(0.2)
+    for again in (pickle.loads(pickle.dumps(motion)), copy.deepcopy(motion)):  # noqa: S301 (of our own making)
+        assert again["rest.tau"][-1] == motion["rest.tau"][-1]
+    for name in ("motion.nc", "motion.parquet"):
+        with pytest.raises(
+            sw.ModelFileError, match=r"FMUTorque 'rest' cannot be saved: fmu .*pickle it, or.*to_pandas"
+        ):
+            motion.save(tmp_path / name)
+    assert list(motion.to_pandas("rest.tau").columns) == ["rest.tau"]
 
 
 def test_a_law_outside_is_evaluated_for_arrays_as_for_numbers(spring: Path) -> None:

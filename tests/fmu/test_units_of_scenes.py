@@ -37,8 +37,6 @@ SPANS = {
     "bldc-shaft": 0.05,
 }
 """Of model exchange, s, where FMPy's solver takes thousands of steps of low order for each swing of the shafts."""
-LARGEST = {"bldc-shaft": 400_000}
-"""Bytes of a binary, where there are many sets of equations."""
 
 
 @lru_cache(maxsize=2)
@@ -59,7 +57,7 @@ def test_a_scene_moves_as_its_unit(scene: str, tmp_path: Path, monkeypatch: pyte
         assert validate_fmu(str(path)) == []
         with zipfile.ZipFile(path) as archive:
             sizes = [item.file_size for item in archive.infolist() if item.filename.startswith("binaries")]
-        assert sizes[0] < LARGEST.get(scene, 200_000)
+        assert sizes[0] < 200_000
     for kind in KINDS:
         end = SPANS.get(scene, SCENES[scene].t_end) if kind == "ModelExchange" else SCENES[scene].t_end
         times = np.linspace(0.0, end, 401)

@@ -76,6 +76,12 @@ class Instance:
         read(rates.ctypes.data_as(POINTER(c_double)), self.size)
         return [float(rate) for rate in rates]
 
+    def nominals(self) -> list[float]:
+        """The usual sizes of the states."""
+        sizes = np.empty(self.size)
+        self.unit.getNominalsOfContinuousStates(sizes.ctypes.data_as(POINTER(c_double)), self.size)
+        return [float(size) for size in sizes]
+
     def slope(self, unknowns: Sequence[str], knowns: Sequence[str], seed: Sequence[float]) -> list[float]:
         """The directional derivative."""
         places = [self.references[name] for name in unknowns], [self.references[name] for name in knowns]

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 from shaftwork.ccode.c_texts import runtime_names
 from shaftwork.ccode.writer import CodeWriter, Variable
 from shaftwork.components.laws import as_expression
-from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.core.files import replaced
 from shaftwork.core.parameters import in_si
@@ -145,7 +144,7 @@ def checked_name(name: Any) -> str:
 
 
 def _input_values(model: Model, inputs: Sequence[str]) -> dict[str, float]:
-    """The default value of each input: that of its law at t = 0, or 0 where it depends on more than the time.
+    """The default value of each input: that of its law at t = 0 and at rest, or 0 where it has none there.
 
     Raises:
         ParameterError: it is no parameter that may vary with the time.
@@ -162,8 +161,9 @@ def _input_values(model: Model, inputs: Sequence[str]) -> dict[str, float]:
                 f"There are: {listed(laws, 12) or 'none'}."
             )
         owner, _, key = name.rpartition(".")
-        law = as_expression(getattr(parts[owner], key) or 0.0).subs(TIME, 0)
-        values[name] = float(law) if law.is_number else 0.0
+        law = as_expression(getattr(parts[owner], key) or 0.0)
+        first = law.subs(dict.fromkeys(law.free_symbols, 0))
+        values[name] = float(first) if first.is_finite else 0.0
     return values
 
 

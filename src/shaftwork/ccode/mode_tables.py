@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 from collections import ChainMap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
-from sympy import Expr, Integer, Piecewise
+from sympy import Expr, Float, Integer, Piecewise
 
 from shaftwork.ccode.c_printing import Statements, array, function, text_of
-from shaftwork.ccode.c_texts import dispatcher, runtime
+from shaftwork.ccode.c_texts import runtime
 from shaftwork.ccode.equation_set import EquationSet
-from shaftwork.ccode.set_functions import SetFunctions
+from shaftwork.ccode.set_functions import SetFunctions, functions_of_sets
 from shaftwork.codegen.state_transfer import WITHOUT_INERTIA, StateTransfer
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH
 from shaftwork.components.laws import t as TIME
@@ -133,32 +133,29 @@ class ModeTables:
     def texts(self, functions: Sequence[SetFunctions], statements: Statements) -> list[str]:
         """The functions and tables of all sets."""
         texts = [runtime("modes.c"), *self._tables()]
-        for one, guards in zip(functions, self._guards, strict=True):
-            texts += [*self._of_set(one, guards)]
-        names = ("guards", "across", "begins", "masses", "shares")
-        texts += [dispatcher(name, len(functions)) for name in names]
+        assignments = [self._assignments(*pair) for pair in zip(functions, self._guards, strict=True)]
+        for name in assignments[0]:
+            texts += functions_of_sets(name, [one[name] for one in assignments], statements)
         return [*texts, self._leave_numbers(functions[0], statements)]
 
-    def _of_set(self, one: SetFunctions, guards: ModeGuards) -> Iterator[str]:
-        """The functions of a set: guards, speeds across machines, where motions begin, and answers to impulses."""
-        parts, size = {part.name: part for part in one.form.graph.parts}, self._most_modes
-        fewer = [Integer(0)] * (self.most_guards - len(guards.expressions))
-        yield one.written("guards", self._numbered("g", self.most_guards), [*guards.expressions, *fewer])
+    def _assignments(self, one: SetFunctions, guards: ModeGuards) -> Mapping[str, Mapping[str, Expr]]:
+        """Of a set: guards, speeds across machines, where motions begin, and answers to impulses."""
+        machines, size = enumerate(self._machines), self._most_modes
+        parts = {part.name: part for part in one.form.graph.parts}
+        fewer = [Float(0.0)] * (self.most_guards - len(guards.expressions))
         speeds, begins = list[Expr](), dict[str, Expr]()
-        for k, machine in enumerate(self._machines):
+        for k, machine in machines:
             part = parts[machine.part.name]
             speeds.append(one.observables.guard(part, machine.modes, ACROSS))
             for n, mode in enumerate(machine.modes.options):
                 condition = Piecewise((Integer(1), mode.starts), (Integer(0), True))
                 begins[f"holds[{k * size + n}]"] = one.observables.guard(part, machine.modes, condition)
-        yield one.written("across", self._numbered("speeds", len(speeds)), speeds)
-        yield one.written("begins", [*begins], [*begins.values()])
-        gains = dict(self._gains(one, speeds))
-        yield one.written("shares", [*gains], [*gains.values()])
-
-    @staticmethod
-    def _numbered(name: str, count: int) -> list[str]:
-        return [f"{name}[{k}]" for k in range(count)]
+        return {
+            "guards": {f"g[{k}]": guard for k, guard in enumerate((*guards.expressions, *fewer))},
+            "across": {f"speeds[{k}]": speed for k, speed in enumerate(speeds)},
+            "begins": begins,
+            "shares": dict(self._gains(one, speeds)),
+        }
 
     def _gains(self, one: SetFunctions, speeds: Sequence[Expr]) -> Iterator[tuple[str, Expr]]:
         """What the speed across each machine has of that of each inertia; nothing where torques tell it as well."""

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 from sympy import Add, Expr, Integer, Symbol
 
 from shaftwork.ccode.c_printing import Statements, function
-from shaftwork.ccode.c_texts import signature
+from shaftwork.ccode.c_texts import ARGUMENTS, dispatcher, signature
 from shaftwork.ccode.equation_set import EquationSet
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.law_slopes import slope
@@ -64,42 +64,34 @@ class SetFunctions:
         return bool(self.form.dependent_through and self.form.through_states)
 
     @cached_property
+    def assignments(self) -> Mapping[str, Mapping[str, Expr]]:
+        """By the name of a function what it assigns, target to expression."""
+        outputs = {f"y[{k}]": self.observables.quantity(name) for k, name in enumerate(self.layout.outputs)}
+        stored = {f"stored[{k}]": self.observables.store(name) for k, name in enumerate(self.layout.stores)}
+        masses = {"masses": self._masses()} if self.layout.has_modes else {}
+        return {"rates": self._rates(), "jacobian": self._jacobian(), "outputs": outputs, "stores": stored} | masses
+
+    @cached_property
     def text(self) -> str:
-        """All functions."""
-        parts = [self._rates(), self._jacobian(), self._outputs(), self._stores()]
-        parts += [self._masses()] if self._ties or self.layout.has_modes else []
-        parts += [self._take_up()]
-        return "\n".join(parts)
+        """The functions that no other set shares."""
+        masses = self._masses() if self._ties and not self.layout.has_modes else None
+        inertias = [self._function("masses", self.assigned([*masses], [*masses.values()]))] if masses else []
+        return "\n".join([*inertias, self._take_up()])
 
-    def written(self, name: str, targets: Sequence[str], expressions: Sequence[Expr]) -> str:
-        """A function of this set that assigns expressions to targets: its name ends with the number of the set."""
-        return self._function(name, [*self.assigned(targets, expressions)])
-
-    def _function(self, name: str, lines: Sequence[str]) -> str:
-        return function(signature(name, f"_{self.number}"), lines)
+    def _function(self, name: str, lines: Iterable[str]) -> str:
+        """A function of this set: its name ends with the number of the set."""
+        return function(signature(name, f"_{self.number}"), [*lines])
 
     def assigned(self, targets: Sequence[str], expressions: Sequence[Expr]) -> Iterator[str]:
         """Lines that assign expressions to targets."""
         return self.layout.statements.assigned(targets, expressions)
 
-    def _rates(self) -> str:
-        expressions = list(self.rows.rates)
-        targets = [f"dx[{place}]" for place in self.places]
-        for name in self.layout.states:
-            if name in self._dependent:  # so that all states of a motion have rates in all of its modes
-                targets.append(f"dx[{self.layout.states.index(name)}]")
-                expressions.append(self._dependent[name])
-        return self.written("rates", targets, expressions)
-
-    @cached_property
-    def _dependent(self) -> Mapping[str, Expr]:
-        """The rates of what is stored and no state here, by name."""
-        names = [name for name in self.layout.states if name not in {state.name for state in self.form.states}]
-        return {
-            name: self._store_rate(branch)
-            for name, branch in StateTransfer(self.form).branches.items()
-            if name in names
-        }
+    def _rates(self) -> Mapping[str, Expr]:
+        """The rates of the states, and of what is stored and no state here: all have some in all modes."""
+        rates = {f"dx[{place}]": rate for place, rate in zip(self.places, self.rows.rates, strict=True)}
+        branches = StateTransfer(self.form).branches
+        others = {name: k for k, name in enumerate(self.layout.states) if k not in self.places and name in branches}
+        return rates | {f"dx[{k}]": self._store_rate(branches[name]) for name, k in others.items()}
 
     def _store_rate(self, number: int) -> Expr:
         """The rate of the speed of an inertia, or of the torque of a spring, that follows others."""
@@ -109,27 +101,17 @@ class SetFunctions:
         part, (first, second) = self.form.graph.parts[branch.part], branch.template.ends
         return law * (self.observables.across(part, first) - self.observables.across(part, second))
 
-    def _jacobian(self) -> str:
-        targets, slopes, size = list[str](), list[Expr](), len(self.layout.states)
-        for row, rate in zip(self.places, self.rows.rates, strict=True):
-            symbols = rate.free_symbols
-            for column, state in zip(self.places, self.rows.states, strict=True):
-                if state in symbols:
-                    targets.append(f"slopes[{row * size + column}]")
-                    slopes.append(slope(rate, state))
-        return self.written("jacobian", targets, slopes)
+    def _jacobian(self) -> Mapping[str, Expr]:
+        size, states = len(self.layout.states), list(zip(self.places, self.rows.states, strict=True))
+        return {
+            f"slopes[{row * size + column}]": slope(rate, state)
+            for row, rate in zip(self.places, self.rows.rates, strict=True)
+            for symbols in [rate.free_symbols]
+            for column, state in states
+            if state in symbols
+        }
 
-    def _outputs(self) -> str:
-        expressions = [self.observables.quantity(name) for name in self.layout.outputs]
-        targets = [f"y[{k}]" for k in range(len(expressions))]
-        return self.written("outputs", targets, expressions)
-
-    def _stores(self) -> str:
-        expressions = [self.observables.store(name) for name in self.layout.stores]
-        targets = [f"stored[{k}]" for k in range(len(expressions))]
-        return self.written("stores", targets, expressions)
-
-    def _masses(self) -> str:
+    def _masses(self) -> Mapping[str, Expr]:
         """C + Q K F': the inertias of the states with all that turns with them, an array (n, n) of zeros before."""
         form, n = self.form, len(self.form.across_states)
         entries = {(k, k): form.law_of(branch) for k, branch in enumerate(form.across_states)}
@@ -138,8 +120,7 @@ class SetFunctions:
             for (first, share), (second, gain) in ((one, other) for one in cutset for other in loop):
                 at = form.across_states.index(first), form.across_states.index(second)
                 entries[at] = entries.get(at, Integer(0)) + share * form.law_of(link) * gain
-        targets = [f"mass[{row * n + column}]" for row, column in entries]
-        return self.written("masses", targets, [*entries.values()])
+        return {f"mass[{row * n + column}]": entry for (row, column), entry in entries.items()}
 
     def _row(self, rows: Mapping[int, Row], link: int) -> list[tuple[int, Expr]]:
         """Gains of states of speed in the loop or the cutset of a link."""
@@ -208,6 +189,37 @@ class SetFunctions:
 
     def _stored(self, branch: int) -> Expr:
         return stored_symbol(store_name(self.form.graph, self.form.graph.branches[branch]))
+
+
+def functions_of_sets(name: str, sets: Sequence[Mapping[str, Expr]], statements: Statements) -> Iterator[str]:
+    """A function of each set of equations, and the one that calls that of the set of an instance.
+
+    Rows that half of the sets or more have in common stand in one function that theirs call. Rows of fewer sets stay
+    with the others of their set: what they have in common with those, such as a sine, is then evaluated once.
+
+    Args:
+        name: of the functions, as in `c_texts.ARGUMENTS`.
+        sets: what each of them assigns, target to expression.
+        statements: writes expressions.
+    """
+    call = ", ".join(("m", "t", *ARGUMENTS[name]))
+    sharers: dict[tuple[str, Expr], list[int]] = {}
+    for number, one in enumerate(sets):
+        for row in one.items():
+            sharers.setdefault(row, []).append(number)
+    groups: dict[tuple[int, ...], dict[str, Expr]] = {}
+    for (target, expression), numbers in sharers.items():
+        together = [tuple(numbers)] if 2 * len(numbers) >= len(sets) else [(number,) for number in numbers]
+        for sharing in together:
+            groups.setdefault(sharing, {})[target] = expression
+    lines: dict[str, list[str]] = {f"_{number}": [] for number in range(len(sets))}
+    for k, (sharing, rows) in enumerate(groups.items()):
+        suffix = f"_shared_{k}" if len(sharing) > 1 else f"_{sharing[0]}"
+        for number in sharing if len(sharing) > 1 else ():
+            lines[f"_{number}"].append(f"{name}{suffix}({call});")
+        lines.setdefault(suffix, []).extend(statements.assigned([*rows], [*rows.values()]))
+    yield from (function(signature(name, suffix), text) for suffix, text in reversed(lines.items()))
+    yield dispatcher(name, len(sets))
 
 
 def stored_symbol(name: str) -> Symbol:

@@ -13,12 +13,13 @@ from shaftwork.ccode.c_printing import Statements, array
 from shaftwork.ccode.c_texts import dispatcher, filled, names_of, runtime
 from shaftwork.ccode.equation_set import EquationSet
 from shaftwork.ccode.instants import Instants
-from shaftwork.ccode.set_functions import ArrayLayout, SetFunctions, stored_symbol
+from shaftwork.ccode.set_functions import ArrayLayout, SetFunctions, functions_of_sets, stored_symbol
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import SignalError
 from shaftwork.formulation.form import Names
 from shaftwork.network.netlist import listed
+from shaftwork.pipeline.arguments import NOMINAL
 
 if TYPE_CHECKING:
     from shaftwork.ccode.mode_tables import ModeTables
@@ -33,11 +34,13 @@ class Variable(NamedTuple):
         name: in the network.
         unit: its unit, in SI.
         value: the default of a parameter or an input; of other variables 0.
+        nominal: the usual size of a state, at a speed of one; of other variables 1.
     """
 
     name: str
     unit: str
     value: float = 0.0
+    nominal: float = 1.0
 
 
 class CodeWriter:
@@ -90,7 +93,8 @@ class CodeWriter:
     def states(self) -> tuple[Variable, ...]:
         """The states of all sets."""
         units = {state.name: state.unit for one in self.sets for state in one.form.states}
-        return tuple(Variable(name, unit) for name, unit in units.items())
+        tolerances = ChainMap(*(dict(one.nominal) for one in self.sets))
+        return tuple(Variable(name, unit, nominal=tolerances[name] / NOMINAL) for name, unit in units.items())
 
     @cached_property
     def stores(self) -> tuple[str, ...]:
@@ -142,9 +146,11 @@ class CodeWriter:
         layout = ArrayLayout(states, self.stores, outputs, modes is not None, statements)
         functions = [SetFunctions(number, one, layout) for number, one in enumerate(self.sets)]
         still = [symbol for symbol, code in self._names.items() if code.startswith(("m->p", "m->u"))]
-        body = [one.text for one in functions]
-        names = ("rates", "jacobian", "outputs", "stores", "take_up")
-        body += [dispatcher(name, len(functions)) for name in names]
+        body = list[str]()
+        for name in functions[0].assignments:
+            body += functions_of_sets(name, [one.assignments[name] for one in functions], statements)
+        body += [one.text for one in functions]
+        body.append(dispatcher("take_up", len(functions)))
         body += modes.texts(functions, statements) if modes else [runtime("no_modes.c")]
         body.append(Instants(self._model.form.graph, still).text(statements))
         text = "\n".join(body)
@@ -158,14 +164,10 @@ class CodeWriter:
         helpers = ["numbers.c"] * (modes is not None or "solve(" in text)
         helpers += [file for file, call in calls.items() if call in text]
         events = ("events.c", "impacts.c", "iteration.c") if modes else ("smooth.c",)
-        first = [runtime("head.c"), self._nominal, *tables, *map(runtime, helpers), text]
+        nominal = array("const double", "NOMINAL", [repr(NOMINAL * state.nominal) for state in self.states])
+        first = [runtime("head.c"), nominal, *tables, *map(runtime, helpers), text]
         last = map(runtime, ("dop853.c", "solver.c", "jumps.c", *events, "common.c"))
         return "\n".join([*first, *last, *(modes.names if modes else ()), self._init])
-
-    @property
-    def _nominal(self) -> str:
-        nominal = ChainMap(*(dict(one.nominal) for one in self.sets))
-        return array("const double", "NOMINAL", [repr(nominal[variable.name]) for variable in self.states])
 
     @property
     def _init(self) -> str:

@@ -1,4 +1,4 @@
-"""Laws that another program evaluates: functions of numbers whose formulas nobody here knows."""
+"""External functions: laws without a formula here, evaluated by another program."""
 
 from __future__ import annotations
 
@@ -14,86 +14,86 @@ RELATIVE_STEP = 6e-6
 """Of a central difference, the cube root of the rounding of floats: its error is then least, some 4e-11."""
 
 
-class Program(Protocol):
-    """What evaluates laws outside: a pure function of its arguments, however often and in which order it is asked."""
+class ExternalFunction(Protocol):
+    """A function of several outputs; a pure one, so that calls may be repeated and come in any order."""
 
     key: str
-    """The same for the same program, and for no other."""
+    """Identifies the function."""
 
-    def value(self, row: int, arguments: tuple[float, ...]) -> float:
-        """The value of one of its laws.
+    def value(self, output: int, arguments: tuple[float, ...]) -> float:
+        """The value of one output.
 
         Args:
-            row: number of the law.
+            output: its index.
             arguments: numbers in SI.
         """
         ...
 
 
-_PROGRAMS: dict[str, Program] = {}
-"""Programs by their keys: compiled code is text and holds the key alone."""
+_FUNCTIONS: dict[str, ExternalFunction] = {}
+"""Functions by their keys: compiled code is text and holds the key alone."""
 
 
 class Handle(sympy.Atom):  # type: ignore[misc]
-    """A program among the arguments of an expression."""
+    """An external function among the arguments of an expression."""
 
     is_commutative = True
 
-    def __new__(cls, program: Program) -> Self:
-        """The handle of a program; that of the same key goes on where there is one.
+    def __new__(cls, function: ExternalFunction) -> Self:
+        """The handle of a function; an instance of the same key is reused.
 
         Args:
-            program: evaluates the laws.
+            function: to be called.
         """
         handle: Self = super().__new__(cls)
-        handle.program = _PROGRAMS.setdefault(program.key, program)
+        handle.function = _FUNCTIONS.setdefault(function.key, function)
         return handle
 
-    program: Program
+    function: ExternalFunction
 
-    def __getnewargs__(self) -> tuple[Program]:
-        return (self.program,)
+    def __getnewargs__(self) -> tuple[ExternalFunction]:
+        return (self.function,)
 
     def _hashable_content(self) -> tuple[str]:
-        return (self.program.key,)
+        return (self.function.key,)
 
     def _sympystr(self, _printer: Any) -> str:
-        return repr(self.program.key)
+        return repr(self.function.key)
 
     _sympyrepr = _pythoncode = _numpycode = _sympystr
 
 
-def evaluated(key: str, row: Any, column: Any, *arguments: Any) -> Any:
+def evaluated(key: str, output: Any, direction: Any, *arguments: Any) -> Any:
     """Value of `External`, for numbers or arrays of numbers.
 
     Args:
-        key: of the program.
-        row: number of its law.
-        column: of the argument by which the slope is asked; -1 for the value.
-        *arguments: of the law.
+        key: of the function.
+        output: index of the output.
+        direction: index of the argument of a partial derivative; -1 for the value.
+        *arguments: of the function.
     """
-    law, place = int(row), int(column)
+    function, indices = _FUNCTIONS[key], (int(output), int(direction))
     if all(isinstance(argument, int | float) for argument in arguments):
-        return _number(_PROGRAMS[key], law, place, [float(argument) for argument in arguments])
+        return _number(function, *indices, [float(argument) for argument in arguments])
     broadcast = np.broadcast_arrays(*(np.asarray(argument, dtype=float) for argument in arguments))
     points = zip(*(values.ravel().tolist() for values in broadcast), strict=True)
-    numbers = [_number(_PROGRAMS[key], law, place, list(point)) for point in points]
+    numbers = [_number(function, *indices, list(point)) for point in points]
     return np.array(numbers).reshape(broadcast[0].shape)
 
 
-def _number(program: Program, row: int, column: int, point: Sequence[float]) -> float:
-    if column < 0:
-        return program.value(row, tuple(point))
-    step = RELATIVE_STEP * max(1.0, abs(point[column]))
-    before, after = ([*point[:column], point[column] + side * step, *point[column + 1 :]] for side in (-1, 1))
-    difference = program.value(row, tuple(after)) - program.value(row, tuple(before))
-    return difference / (after[column] - before[column])
+def _number(function: ExternalFunction, output: int, direction: int, point: Sequence[float]) -> float:
+    if direction < 0:
+        return function.value(output, tuple(point))
+    k, step = direction, RELATIVE_STEP * max(1.0, abs(point[direction]))
+    before, after = ([*point[:k], point[k] + side * step, *point[k + 1 :]] for side in (-1, 1))
+    difference = function.value(output, tuple(after)) - function.value(output, tuple(before))
+    return difference / (after[k] - before[k])
 
 
 class External(sympy.Function):  # type: ignore[misc]
-    """A law of a program: (handle, number of the law, -1 or the argument of a slope, arguments).
+    """An output of an external function or its partial derivative: (handle, output, argument or -1, arguments).
 
-    Slopes are central differences, good to about ten digits.
+    Partial derivatives are central differences, good to about ten digits.
     """
 
     # lambdify finds the numerical function of a sympy function under this name
@@ -101,14 +101,14 @@ class External(sympy.Function):  # type: ignore[misc]
 
     @classmethod
     def eval(cls, *_arguments: sympy.Expr) -> None:
-        """It stays as it is, also for numbers: a program is asked during a run alone."""
+        """It stays as it is, also for numbers: the function is called during a run alone."""
 
     def _eval_is_extended_real(self) -> bool:
         return True
 
     def _eval_evalf(self, _precision: int) -> sympy.Expr:
-        handle, row, column, *arguments = self.args
-        return External(handle, row, column, *(argument.evalf() for argument in arguments))
+        handle, output, direction, *arguments = self.args
+        return External(handle, output, direction, *(argument.evalf() for argument in arguments))
 
     def _ccode(self, _printer: Any) -> str:
         raise CompileError(
@@ -116,19 +116,19 @@ class External(sympy.Function):  # type: ignore[misc]
         )
 
     def _eval_derivative(self, symbol: sympy.Symbol) -> sympy.Expr:
-        handle, row, column, *arguments = self.args
-        slopes = [argument.diff(symbol) for argument in arguments]
-        if column >= 0 and any(slope != 0 for slope in slopes):
-            raise CompileError(f"A law of {handle.program.key} has slopes, but no second derivatives.")
-        pairs = enumerate(slopes)
-        return sympy.Add(*(External(handle, row, k, *arguments) * slope for k, slope in pairs if slope != 0))
+        handle, output, direction, *arguments = self.args
+        inner = [argument.diff(symbol) for argument in arguments]
+        if direction >= 0 and any(derivative != 0 for derivative in inner):
+            raise CompileError(f"{handle.function.key} has first derivatives, but no second ones.")
+        chain = ((k, derivative) for k, derivative in enumerate(inner) if derivative != 0)
+        return sympy.Add(*(External(handle, output, k, *arguments) * derivative for k, derivative in chain))
 
     def _latex(self, printer: Any, exp: str | None = None) -> str:
-        _, row, column, *arguments = self.args
+        _, output, direction, *arguments = self.args
         power = "" if exp is None else f"^{{{exp}}}"
-        slope = "" if column < 0 else f",{column}"
+        derivative = "" if direction < 0 else f",{direction}"
         inside = ", ".join(printer._print(argument) for argument in arguments)  # noqa: SLF001
-        return rf"f_{{{row}{slope}}}{power}\left({inside}\right)"
+        return rf"f_{{{output}{derivative}}}{power}\left({inside}\right)"
 
 
 NUMERICAL = {"External": evaluated}

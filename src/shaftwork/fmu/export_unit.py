@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from shaftwork.ccode.c_export import CCode, c_code
 from shaftwork.ccode.equation_set import EquationSet
+from shaftwork.ccode.writer import Variable
 from shaftwork.core.errors import CompileError, ParameterError
 from shaftwork.core.files import drafted, in_a_folder
 from shaftwork.core.parameters import in_si
@@ -32,6 +33,8 @@ _KINDS = {"both": KINDS, "model exchange": KINDS[:1], "co-simulation": KINDS[1:]
 _SYSTEMS = {"Linux": "linux", "Darwin": "darwin", "Windows": "windows"}
 _MACHINES = {"amd64": "x86_64", "arm64": "aarch64", "i686": "x86"}
 _EXTENSIONS = {"Linux": ".so", "Darwin": ".dylib", "Windows": ".dll"}
+SMALL = ("-ffunction-sections", "-fdata-sections", "-fno-asynchronous-unwind-tables", "-fno-math-errno")
+"""Options of the compiler that leave out what an FMU does not use: code of other uses, tables and `errno`."""
 _DAY = (1980, 1, 1, 0, 0, 0)  # of all files in the archive: the same network gives the same bytes
 
 
@@ -56,7 +59,7 @@ def export_unit(
         raise ParameterError(f"kind = {kind!r} of an FMU is none of: {', '.join(map(repr, _KINDS))}.")
     code = _code(model, inputs, outputs)
     end = in_si("t_end", t_end, "s", above=0)
-    unit = _interface(model.name, code, outputs, _dependencies(model, code), end)
+    unit = _interface(model, code, outputs, end)
     texts = _sources(unit, code, version)
     compiled = tuple(name for name in texts if name.endswith(".c"))
     members = {"modelDescription.xml": model_description(unit, version, _KINDS[kind], compiled)}
@@ -98,31 +101,36 @@ def _dependencies(model: Model, code: CCode) -> dict[str, tuple[str, ...]]:
     return {name: tuple(other for other in moving if other in symbols) for name, symbols in read.items()}
 
 
-def _interface(
-    title: str,
-    code: CCode,
-    outputs: Sequence[str] | None,
-    dependencies: Mapping[str, tuple[str, ...]],
-    t_end: float,
-) -> UnitInterface:
+def _interface(model: Model, code: CCode, outputs: Sequence[str] | None, t_end: float) -> UnitInterface:
     """What the unit shows: states that are outputs as well, and other outputs."""
     states = {variable.name for variable in code.states}  # only asked for membership
     others = states | {variable.name for variable in code.inputs}
     wanted = tuple(variable.name for variable in code.outputs) if outputs is None else tuple(outputs)
     token = hashlib.sha256(f"{code.header}\0{code.source}".encode()).hexdigest()
     return UnitInterface(
-        title=title,
+        title=model.name,
         identifier=code.name,
         token="{" + "-".join((token[:8], token[8:12], token[12:16], token[16:20], token[20:32])) + "}",
-        parameters=tuple(UnitVariable(*variable) for variable in code.parameters),
-        inputs=tuple(UnitVariable(*variable) for variable in code.inputs),
-        states=tuple(UnitVariable(v.name, v.unit, 0.0) for v in code.states),
+        parameters=tuple(_bounded(model, v, 1.0) for v in code.parameters),
+        inputs=tuple(_bounded(model, v, abs(v.value) or 1.0) for v in code.inputs),
+        states=tuple(UnitVariable(v.name, v.unit, 0.0, v.nominal) for v in code.states),
         outputs=tuple(UnitVariable(_shown(v.name, code), v.unit) for v in code.outputs if v.name not in others),
         shown=frozenset(states & {*wanted}),
         indicators=code.guards,
-        dependencies=dependencies,
+        dependencies=_dependencies(model, code),
         t_end=t_end,
     )
+
+
+def _bounded(model: Model, variable: Variable, nominal: float) -> UnitVariable:
+    """A parameter or an input with the bounds that its part declares; those of FMI are inclusive."""
+    owner, _, name = variable.name.rpartition(".")
+    part = next(part for part in model.form.graph.parts if part.name == owner)
+    limits = part.component.declared.get(name)
+    if limits is None:
+        return UnitVariable(variable.name, variable.unit, variable.value, nominal)
+    lowest = limits.above if limits.at_least is None else limits.at_least
+    return UnitVariable(variable.name, variable.unit, variable.value, nominal, lowest, limits.at_most)
 
 
 def _shown(name: str, code: CCode) -> str:
@@ -135,7 +143,7 @@ def _sources(unit: UnitInterface, code: CCode, version: str) -> dict[str, str]:
     folder = files("shaftwork.fmu") / "sources"
     layer = f"fmi{version[0]}.c"
     texts = {f"{code.name}.c": code.source}
-    texts |= {name: (folder / name).read_text(encoding="utf-8") for name in ("unit.c", layer, "unit.h")}
+    texts |= {name: (folder / name).read_text(encoding="utf-8") for name in ("unit.c", layer, "unit.h", "unit_api.inc")}
     return {**texts, f"{code.name}.h": code.header, "unit_config.h": _configuration(unit, code)}
 
 
@@ -160,6 +168,7 @@ def _configuration(unit: UnitInterface, code: CCode) -> str:
         f'#define UNIT_NAME "{code.name}"',
         f'#define UNIT_TOKEN "{unit.token}"',
         *(f"#define UNIT_{name} {size}" for name, size in sizes.items()),
+        _listed("UNIT_NOMINALS", [state.nominal for state in unit.states], "of each state its usual size"),
         _listed("UNIT_STORES_OF_STATES", stores, "of each state its place among the start values"),
         _listed(
             "UNIT_PLACES_OF_OUTPUTS", [places[v.name] for v in unit.outputs], "of each output among those of the model"
@@ -169,7 +178,7 @@ def _configuration(unit: UnitInterface, code: CCode) -> str:
     return "\n".join(lines)
 
 
-def _listed(name: str, numbers: Sequence[int], meaning: str) -> str:
+def _listed(name: str, numbers: Sequence[float], meaning: str) -> str:
     return f"#define {name} {{{', '.join(map(str, numbers)) or '0'}}} /* {meaning} */"
 
 
@@ -191,7 +200,8 @@ def _binary(name: str, texts: Mapping[str, str], version: str) -> dict[str, byte
         for file, text in texts.items():
             (Path(folder) / file).write_text(text, encoding="utf-8")
         sources = [file for file in texts if file.endswith(".c")]
-        options = ["-std=c99", "-O2", "-shared", "-fPIC", "-fvisibility=hidden", "-s"]
+        options = ["-std=c99", "-O2", "-shared", "-fPIC", "-fvisibility=hidden", "-s", *SMALL]
+        options += ["-Wl,--gc-sections"] if system == "Linux" else []
         options.append("-Werror=implicit-function-declaration")  # else what is missing shows where the unit is loaded
         done = subprocess.run(  # noqa: S603 (the compiler of this machine, on code made here)
             [compiler, *options, "-o", library, *sources, "-lm"],

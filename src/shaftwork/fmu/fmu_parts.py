@@ -50,7 +50,7 @@ class FMUTorque(_FMUPart):
         _refuse_wrong(self, ("speed", "torque"))
 
     def branches(self, p: Any) -> Iterator[Branch]:
-        unit = Handle(ForeignUnit(p.fmu, p.fmu.speed, p.fmu.torque))
+        unit = Handle(ForeignUnit(p.fmu, "speed", "torque"))
         yield ThroughLaw(-p.gain * _law(unit, len(p.fmu.states), p.fmu, ACROSS), ("a", None), "tau")
         yield from _states(unit, p.fmu, across_of("a"))
 
@@ -76,7 +76,7 @@ class FMUSpeed(_FMUPart):
             )
 
     def branches(self, p: Any) -> Iterator[Branch]:
-        unit = Handle(ForeignUnit(p.fmu, p.fmu.torque, p.fmu.speed))
+        unit = Handle(ForeignUnit(p.fmu, "torque", "speed"))
         yield AcrossLaw(_law(unit, len(p.fmu.states), p.fmu, Integer(0)), ("a", None), "drive")
         yield from _states(unit, p.fmu, through_of("drive"))
 

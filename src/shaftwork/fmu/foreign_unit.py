@@ -18,10 +18,14 @@ from typing import Any, Self
 import numpy as np
 
 from shaftwork.core.errors import ParameterError, SimulationError, imported
+from shaftwork.fmu.unit_interface import base_unit
 
 MOST_STATES = 256
 """Continuous states that an FMU in a network may have: each is a state of the network."""
 _NUMBERS = ("Real", "Float64")
+_BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+_SI = {"speed": "rad/s", "torque": "N*m"}
+"""The SI units of what an FMU and its node give each other."""
 
 
 @dataclass(frozen=True)
@@ -32,13 +36,14 @@ class FMU:
 
     Args:
         path: of the file.
-        speed: name of its variable for the speed of the node, rad/s.
-        torque: name of its variable for the torque on the node, N m.
-        start: values of its parameters and of its other inputs, by name.
+        speed: name of its variable for the speed of the node, in rad/s or a unit that its description tells in SI.
+        torque: name of its variable for the torque on the node, in N m or a unit that its description tells in SI.
+        start: values of its parameters and of its other inputs, by name, in the units of the FMU.
 
     Raises:
         MissingExtraError: FMPy is not installed.
-        ParameterError: the file cannot be read, has no such variable, or holds what a right-hand side cannot.
+        ParameterError: the file cannot be read, has no such variable, has one in the unit of another quantity, or
+            holds what a right-hand side cannot.
     """
 
     path: Path
@@ -60,6 +65,7 @@ class FMU:
                 raise ParameterError(f"FMU '{self.path.name}': start['{name}'] = {value!r} must be a finite number.")
         for name, what in ((self.speed, "speed"), (self.torque, "torque")):
             self._variable(name, ("input", "output"), what)
+            self.scale(what)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return FMU, (self.path, self.speed, self.torque, dict(self.start))
@@ -79,7 +85,8 @@ class FMU:
         """
         raise ParameterError(
             "an FMU is a program that would run in this process, and no text in a file may ask for that. Build the "
-            "part in a script, with fmu=sw.FMU('file.fmu', speed=..., torque=...)"
+            "part in a script, with fmu=sw.FMU('file.fmu', speed=..., torque=...). To store a motion with it, pickle "
+            "it, or take its numbers with to_pandas() or to_xarray()"
         )
 
     @cached_property
@@ -132,6 +139,39 @@ class FMU:
         if reason:
             raise ParameterError(f"FMU '{self.path.name}' {reason}.")
 
+    def scale(self, what: str) -> float:
+        """The SI value of one of the unit that the FMU declares; 1 where it declares none.
+
+        Args:
+            what: "speed" or "torque".
+
+        Raises:
+            ParameterError: the unit is that of another quantity, or nothing tells what it is in SI.
+        """
+        name = getattr(self, what)
+        variable = self._variable(name, ("input", "output"), what)
+        unit = variable.unit or getattr(variable.declaredType, "unit", None)
+        if unit is None:
+            return 1.0
+        exponents, factor, offset = self._in_base_units(unit)
+        if exponents != base_unit(_SI[what])[0] or offset or factor == 0.0 or not math.isfinite(factor):
+            raise ParameterError(
+                f"FMU '{self.path.name}': {what} names '{name}', whose unit '{unit}' does not agree with "
+                f"'{_SI[what]}'. Name a variable of that quantity, or give its unit a BaseUnit in modelDescription.xml."
+            )
+        return factor
+
+    def _in_base_units(self, unit: str) -> tuple[dict[str, int], float, float]:
+        """Exponents of SI base units, factor and offset; where the FMU does not tell them, from the unit's name."""
+        try:
+            for declared in self.description.unitDefinitions:
+                if declared.name == unit and (base := declared.baseUnit) is not None:
+                    exponents = {si: int(getattr(base, si)) for si in _BASE_UNITS}
+                    return {si: n for si, n in exponents.items() if n}, float(base.factor), float(base.offset)
+            return *base_unit(unit.replace(".", "*")), 0.0
+        except (KeyError, ValueError):  # a number that is none, or a name that is none here
+            return {}, 1.0, 0.0
+
     def gives(self, name: str) -> bool:
         """Whether a variable is one of its outputs."""
         return any(v.name == name and v.causality == "output" for v in self.description.modelVariables)
@@ -148,28 +188,31 @@ class FMU:
 class ForeignUnit:
     """One instance of an FMU as a pure function: time, states and input to the rates of the states and the output.
 
-    The states are counted from those that it starts with, as all that a network stores is zero at rest.
+    Input and output are in SI. The states are counted from those that it starts with, as all that a network stores is
+    zero at rest.
 
     Args:
         fmu: the file with its values.
-        input_name: of the variable that is set.
-        output_name: of the variable that is read.
+        reads: what is set, "speed" or "torque".
+        gives: what is read, the other of them.
     """
 
-    def __init__(self, fmu: FMU, input_name: str, output_name: str) -> None:
-        self._fmu, self._input, self._output = fmu, input_name, output_name
-        self.key = f"{fmu} of {fmu.path.stat().st_mtime_ns}, {output_name} by {input_name}"
+    def __init__(self, fmu: FMU, reads: str, gives: str) -> None:
+        self._fmu, self._reads, self._gives = fmu, reads, gives
+        self._input, self._output = getattr(fmu, reads), getattr(fmu, gives)
+        self._input_scale, self._output_scale = fmu.scale(reads), fmu.scale(gives)
+        self.key = f"{fmu} of {fmu.path.stat().st_mtime_ns}, {gives} by {reads}"
         self._lock = threading.Lock()
         self._last: tuple[tuple[float, ...], list[float]] = ((), [])
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return ForeignUnit, (self._fmu, self._input, self._output)
+        return ForeignUnit, (self._fmu, self._reads, self._gives)
 
-    def value(self, row: int, arguments: tuple[float, ...]) -> float:
-        """The rate of state `row`, or the output behind the last one.
+    def value(self, output: int, arguments: tuple[float, ...]) -> float:
+        """The rate of a state, or behind the last of them what the unit gives.
 
         Args:
-            row: number of the state.
+            output: index of the state.
             arguments: time in s, states, and the input.
 
         Raises:
@@ -178,11 +221,12 @@ class ForeignUnit:
         with self._lock:
             if arguments != self._last[0]:
                 self._last = arguments, self._evaluated(*arguments)
-            return self._last[1][row]
+            return self._last[1][output]
 
     def _evaluated(self, t: float, *numbers: float) -> list[float]:
         try:
-            return self._instance.evaluated(t, np.array(numbers[:-1]), numbers[-1])
+            *rates, output = self._instance.evaluated(t, np.array(numbers[:-1]), numbers[-1] / self._input_scale)
+            return [*rates, output * self._output_scale]
         except SimulationError:
             raise
         except Exception as error:  # noqa: BLE001 (FMPy raises plain exceptions)

@@ -142,10 +142,16 @@ def _scalar_3(reference: int, variable: UnitVariable, roles: dict[str, str], der
 
 
 def _numbers(variable: UnitVariable, derivative: int | None) -> dict[str, str]:
-    """Attributes of the type: its unit, its start value, and of a rate the variable whose derivative it is."""
-    attributes = {} if variable.unit == "1" else {"unit": variable.unit}
-    attributes |= {} if variable.start is None else {"start": repr(variable.start)}
-    return attributes | ({} if derivative is None else {"derivative": str(derivative)})
+    """Attributes of the type: its unit, its numbers, and of a rate the variable whose derivative it is."""
+    attributes = {
+        "unit": None if variable.unit == "1" else variable.unit,
+        "min": variable.lowest,
+        "max": variable.highest,
+        "nominal": None if variable.nominal == 1.0 else variable.nominal,
+        "start": variable.start,
+        "derivative": derivative,
+    }
+    return {name: str(value) for name, value in attributes.items() if value is not None}
 
 
 def _unknowns(unit: UnitInterface) -> tuple[list[str], list[str], list[str]]:

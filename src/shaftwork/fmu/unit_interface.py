@@ -53,11 +53,17 @@ class UnitVariable:
         name: "J2.omega".
         unit: SI unit.
         start: value before the start; None of what follows from others.
+        nominal: usual size.
+        lowest: least value that has a sense, or None.
+        highest: largest value that has a sense, or None.
     """
 
     name: str
     unit: str
     start: float | None = None
+    nominal: float = 1.0
+    lowest: float | None = None
+    highest: float | None = None
 
 
 @dataclass(frozen=True)

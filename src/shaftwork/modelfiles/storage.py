@@ -197,7 +197,7 @@ def _saved(part: Component, name: str) -> Any:
         raise ModelFileError(f"{title(part)}: {name} {objection}, so it cannot be saved.")
     if declared.record is not None:
         if (objection := declared.magnitude(repr(value))[1]) is not None:  # a record that no text stands for
-            raise ModelFileError(f"{title(part)}: {name} {objection}, so it cannot be saved.")
+            raise ModelFileError(f"{title(part)} cannot be saved: {name} {objection}.")
         return repr(value)
     if not isinstance(value, Expr) or isinstance(value, Table):
         return value

@@ -285,12 +285,11 @@ int unit_indicators(Unit *unit, double *indicators, size_t n)
 
 int unit_nominals(Unit *unit, double *nominals, size_t n)
 {
+    static const double nominal[] = UNIT_NOMINALS;
     if (wrong_size(unit, n, UNIT_STATES)) {
         return 1;
     }
-    for (size_t i = 0; i < n; i++) {
-        nominals[i] = 1.0;
-    }
+    memcpy(nominals, nominal, n * sizeof *nominals);
     return 0;
 }
 
