@@ -184,6 +184,34 @@ X1 1 2 two
 """,
         1e-5,
     ),
+    "parameters that stand before those they read": (
+        """order
+.param r={2*s}
+.param s={t*1k}
+.param t=1
+.subckt rc a b c=1u
+.param tau={2*c*r}
+R1 a b {tau/c}
+C1 b 0 {c}
+.ends
+V1 in 0 SIN(0 1 50)
+X1 in out rc c=2u
+.tran 1m 60m
+""",
+        1e-5,
+    ),
+    "laws of time and of the own voltage": (
+        """laws
+.param smooth=0.1
+B1 in 0 V={2*sin(300*time)*exp(-time)}
+R1 in out 1k
+C1 out 0 1u
+B2 out 0 I = 1e-3*tanh(v(out)/{smooth})
+B3 0 out I=-1e-4*v(0,out)*abs(v(0, out))
+.tran 1m 60m
+""",
+        1e-5,
+    ),
     "a resistance below zero": (
         """negative
 V1 1 0 SIN(0 5 200)
@@ -341,6 +369,12 @@ T1 1 2 3 0 Z0=50 TD=1n
         ("title\nL1 1 0 1\nR1 1 0 1\nK1 L1 L2 0.5\n", "two inductors"),
         ("title\nL1 1 0 1\nL2 1 0 1\nK1 L1 L2 2\n", "between 0 and 1"),
         ("title\nR1 1 2 1\nR2 2 1 1\n", "no element is at node 0"),
+        ("", "it has no elements"),
+        ("title\n.subckt a 1\nR1 1 0 1\n.ends\n.subckt A 1\nR1 1 0 2\n.ends\n", "line 2 defines this subcircuit, too"),
+        ("title\nR1 1 0 1\n.model m d()\n.model M d(n=2)\n", "line 3 has this model, too"),
+        ("title\nR1 1 0 {p}\n.param p={q}\n.param q={p}\n", "1 names have no value: p; 'p' stands in line 4"),
+        ("title\nB1 1 0 V=2*v(2)\nR1 1 0 1\n", "of the voltage across the source"),
+        ("title\nB1 1 0 5\nR1 1 0 1\n", "V=expression or I=expression"),
         ("title\nR1 1 0 {x}\n", "1 names have no value: x"),
         ("title\nR1 1 0 {1/0}\n", "cannot be read"),
         ("title\nR1 1 0 1e999\n", "line 2"),
