@@ -90,7 +90,7 @@ class Devices:
             "t": self._line,
             "d": self._diode,
             "s": self._switch,
-            "b": self._law,
+            "b": self._expressed,
         }
         if kind not in makers:
             kinds = ", ".join(sorted(one.upper() for one in (*makers, "k", "x")))
@@ -159,7 +159,7 @@ class Devices:
         p, n = self._ends(line)  # SPICE counts the current through the source, ours is delivered
         self.place(CurrentSource(name, i=source_law(line, self.values, self.span)), n, p)
 
-    def _law(self, line: NetlistLine, name: str) -> None:
+    def _expressed(self, line: NetlistLine, name: str) -> None:
         """A B source; of voltages its law may read the one between its own nodes."""
         match = _LAW.match(line.text)
         if match is None:
