@@ -154,8 +154,18 @@ def test_what_is_written_is_read_again(pieces: Pieces) -> None:
 
 REFUSALS = [
     ("  connect(J1.flange_b", "  J1.phi = 0;\n  connect(J1.flange_b", 8, r"an equation is not read\. Read are"),
-    ("  connect(J1.flange_b", "  when time > 1 then\n    J1.w = 0;\n  end when;\n  connect(J1.flange_b", 8, "a when equation"),
-    ("  connect(J1.flange_b", "  for k in 1:3 loop\n    x[k] = 0;\n  end for;\n  connect(J1.flange_b", 8, "a for loop is"),
+    (
+        "  connect(J1.flange_b",
+        "  when time > 1 then\n    J1.w = 0;\n  end when;\n  connect(J1.flange_b",
+        8,
+        "a when equation",
+    ),
+    (
+        "  connect(J1.flange_b",
+        "  for k in 1:3 loop\n    x[k] = 0;\n  end for;\n  connect(J1.flange_b",
+        8,
+        "a for loop is",
+    ),
     (
         "equation",
         "algorithm\n  if time > 1 then\n    x := if a then b else c;\n  end if;\n  while x < 3 loop\n    x := x + 1;\n"

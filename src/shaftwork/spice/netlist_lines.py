@@ -18,7 +18,23 @@ _ELEMENT = re.compile(r"[rlcvi]\w*\s+\S+\s+\S+\s+(?:dc\s+)?[-+.\d]\S*$", re.IGNO
 ENDS = {"r": 2, "l": 2, "c": 2, "v": 2, "i": 2, "d": 2, "e": 4, "g": 4, "s": 4, "t": 4, "f": 2, "h": 2, "k": 0, "b": 2}
 """How many nodes an element has behind its name, by its first letter."""
 ANALYSES = (
-    *("ac", "dc", "disto", "fft", "four", "hb", "lin", "meas", "measure", "nodeset", "noise", "op", "opt", "option"),
+    *(
+        "ac",
+        "csparam",
+        "dc",
+        "disto",
+        "fft",
+        "four",
+        "hb",
+        "lin",
+        "meas",
+        "measure",
+        "nodeset",
+        "noise",
+        "op",
+        "opt",
+        "option",
+    ),
     *("options", "plot", "print", "probe", "pss", "pz", "save", "sens", "step", "tf", "title", "width"),
 )
 """Commands that change nothing in the circuit and its motion, which are left out."""
@@ -106,6 +122,17 @@ class NetlistLine:
             raise self.error(f"'{' '.join(words)}' is not of the form key=value key=value")
         return {key.lower(): value for key, value in zip(keys, values, strict=True)}
 
+    def parameters(self) -> dict[str, str]:
+        """What a .param says: expressions of several words too, with or without braces.
+
+        Raises:
+            LineError: it is not of the form name=expression.
+        """
+        before, *pairs = re.split(r"([A-Za-z_]\w*)\s*=", self.text)
+        if before.strip().lower() != self.command or not pairs:
+            raise self.error("parameters are written .param name=expression")
+        return {name.lower(): text.strip(" ,\t") for name, text in zip(pairs[::2], pairs[1::2], strict=True)}
+
 
 @dataclass(frozen=True)
 class Subcircuit:
@@ -134,7 +161,7 @@ def _plain_lines(text: str) -> Iterator[NetlistLine]:
         content, _, drawing = row.partition(";")
         hints = [hint.strip() for hint in drawing.split(",")]
         if content.strip() and content.strip()[0] not in "#%*" and "nosim" not in hints:
-            yield NetlistLine(number, content.strip(), tuple(_WORD.findall(content)))
+            yield NetlistLine(number, content.strip(), tuple(_WORD.findall(content)) or (content.strip(),))
 
 
 def _spice_lines(text: str) -> Iterator[NetlistLine]:
@@ -246,7 +273,7 @@ def _expanded(
         scope.add(definition.line, definition.values, scope)
         scope.add(line, line.pairs(start), outer)
         for one in (one for one in definition.lines if one.command == ".param"):
-            scope.add(one, one.pairs(1), scope)
+            scope.add(one, one.parameters(), scope)
         circuit = (one for one in definition.lines if one.command != ".param")
         inner = [NetlistLine(one.number, one.text, one.words, prefix, outside, scope) for one in circuit]
         yield from _expanded(inner, definitions, everywhere, scope, depth + 1)

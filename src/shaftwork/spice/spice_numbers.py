@@ -64,7 +64,7 @@ class NetlistValues:
             raise line.error(f"'{text}' depends on time, where a number is needed")
         if not math.isfinite(float(law)):
             raise line.error(f"'{text}' is no finite number")
-        return sympy.Float(law)
+        return sympy.Float(float(law))
 
     def law(self, line: NetlistLine, text: str, **known: Expr) -> Expr:
         """A number or an expression of time, and of names that stand for something known.
