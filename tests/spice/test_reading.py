@@ -186,7 +186,7 @@ X1 1 2 two
     ),
     "parameters that stand before those they read": (
         """order
-.param r=2*s/sqrt(4) + s unused = 3
+.param r={2*s} unused = 2*s + 1
 .param s={t*1k}
 .param t=1
 .subckt rc a b c=1u
