@@ -307,6 +307,9 @@ WRONG = {
     ),
     r'"inertia" is nan': lambda s: s["components"][0]["elements"][0].update(inertia=float("nan")),
     r"its type is 'Disc'\. Types are: Disk": lambda s: s["components"][0]["elements"][0].update(type="Disc"),
+    r"element 'Disk 1': its type is missing": lambda s: s["components"][0]["elements"][0].update(
+        {"": 1.0, "type": None}
+    ),
     r"names the component 'Rotr', which is not": lambda s: s["structure"][0].__setitem__(0, "Rotr.Disk 2"),
     r"has no element 'Disk 9'": lambda s: s["structure"][0].__setitem__(0, "Rotor.Disk 9"),
     r"0 components follow no other": lambda s: s["structure"].append(["Turbine.Disk 1", "Rotor.Disk 1"]),

@@ -184,6 +184,34 @@ X1 1 2 two
 """,
         1e-5,
     ),
+    "parameters that stand before those they read": (
+        """order
+.param r={2*s} unused = 2*s + 1
+.param s={t*1k}
+.param t=1
+.subckt rc a b c=1u
+.param tau={2*c*r}
+R1 a b {tau/c}
+C1 b 0 {c}
+.ends
+V1 in 0 SIN(0 1 50)
+X1 in out rc c=2u
+.tran 1m 60m
+""",
+        1e-5,
+    ),
+    "laws of time and of the own voltage": (
+        """laws
+.param smooth=0.1
+B1 in 0 V={2*sin(300*time)*exp(-time)}
+R1 in out 1k
+C1 out 0 1u
+B2 out 0 I = 1e-3*tanh(v(out)/{smooth})
+B3 0 out I=-1e-4*v(0,out)*abs(v(0, out))
+.tran 1m 60m
+""",
+        1e-5,
+    ),
     "a resistance below zero": (
         """negative
 V1 1 0 SIN(0 5 200)
@@ -278,6 +306,7 @@ def test_random_circuits_with_feedback_move_here_as_in_ngspice(seed: int) -> Non
         ("{2*(3+1)}", 8.0),
         ("'2^3'", 8.0),
         ("{sqrt(4)*1k}", 2e3),
+        ("{2*pi*60}", 120 * np.pi),
     ],
 )
 def test_numbers_have_suffixes_and_units(text: str, value: float) -> None:
@@ -341,6 +370,13 @@ T1 1 2 3 0 Z0=50 TD=1n
         ("title\nL1 1 0 1\nR1 1 0 1\nK1 L1 L2 0.5\n", "two inductors"),
         ("title\nL1 1 0 1\nL2 1 0 1\nK1 L1 L2 2\n", "between 0 and 1"),
         ("title\nR1 1 2 1\nR2 2 1 1\n", "no element is at node 0"),
+        ("", "it has no elements"),
+        ("title\n.param f(x)=2\nR1 1 0 1\n", "line 2"),
+        ("title\n.subckt a 1\nR1 1 0 1\n.ends\n.subckt A 1\nR1 1 0 2\n.ends\n", "line 2 defines this subcircuit, too"),
+        ("title\nR1 1 0 1\n.model m d()\n.model M d(n=2)\n", "line 3 has this model, too"),
+        ("title\nR1 1 0 {p}\n.param p={q}\n.param q={p}\n", "1 names have no value: p; 'p' stands in line 4"),
+        ("title\nB1 1 0 V=2*v(2)\nR1 1 0 1\n", "of the voltage across the source"),
+        ("title\nB1 1 0 5\nR1 1 0 1\n", "V=expression or I=expression"),
         ("title\nR1 1 0 {x}\n", "1 names have no value: x"),
         ("title\nR1 1 0 {1/0}\n", "cannot be read"),
         ("title\nR1 1 0 1e999\n", "line 2"),
@@ -441,6 +477,7 @@ def test_lcapy_laws_may_be_expressions_of_time() -> None:
     ("line", "words"),
     [
         ("U1 buffer; right", "type U"),
+        (",; right", "line 2 ','"),
         ("SW 1 2 0 spdt; right", "no and nc"),
         ("V1 1 0 s 5; down", "not understood"),
         ("E1 1 0 fdopamp 2 3 4 A; right", "plain opamps"),

@@ -99,6 +99,9 @@ class _Writer:
     def _instance(self, part: GraphPart) -> Iterator[str]:
         values = resolve(part.component)[0]
         name = self._names[part.name]
+        if part.branches and {*part.branches} <= {*self._form.tree.redundant}:  # one equation too many for a tool
+            yield f"// {part.name}, a {type(part.component).__name__}, is left out: other couplings say the same"
+            return
         if type(part.component).__name__ == "Ground":
             node = part.nodes["a"]
             domain = ROTATION if node == GROUND else self._graph.domains[node]

@@ -127,9 +127,9 @@ class _TableReading:
                     f"sw.HarmonicTorque at '{title}'.",
                     NetworkWarning,
                 )
-            if row.get(FOREIGN.get(str(kind), "")):
+            if (foreign := FOREIGN.get(str(kind))) is not None and row.get(foreign):
                 raise ModelFileError(
-                    f"{place}: a {kind} has no {FOREIGN[str(kind)]}. Write that of a shaft as a Disk, and add "
+                    f"{place}: a {kind} has no {foreign}. Write that of a shaft as a Disk, and add "
                     "that of a disk to the network."
                 )
             match kind:

@@ -26,7 +26,11 @@ SMOOTH = 1e-4
 """Speed in rad/s over which a friction changes its sign: of some 100 rad/s that is 1e-6."""
 CONDUCTING, BLOCKING = 1e6, 1e-9
 """Conductances in S, N m s/rad, of what is rigid or open: far beyond those of drive trains in SI."""
-WIDTH = 110
+OPTIONS = "reltol=1e-6 abstol=1e-12 vntol=1e-9 chgtol=1e-18 pivrel=0.1 method=trap"
+"""With the small pivots that ngspice takes by default, rounding in undamped trains is a curvature to its step control,
+which then gives up."""
+WIDTH, UNBROKEN = 110, "\xa0"
+"""Signs of a line; and a space at which none ends."""
 HEAD = """\
 * {name}
 * Analogue circuit: speeds (rad/s, m/s) are voltages, torques (N m) and forces (N) currents,
@@ -55,7 +59,7 @@ def deck(model: Model, t_end: float, step: float | None, initial: Any) -> str:
     lines: list[str] = []
     for part in form.graph.parts:
         try:
-            lines += ["", *_comments(part, parts, form), *elements.of_part(part.name, part.branches)]
+            lines += ["", *_comments(part, parts, form), *elements.of_part(part)]
         except NoSpiceFormError as error:
             problems.append(_problem(part, error, form))
     if problems:
@@ -80,10 +84,7 @@ def _smoothed(form: StateForm) -> tuple[dict[str, SmoothedPart], list[Diagnostic
 
 def _problem(part: GraphPart, error: NoSpiceFormError, form: StateForm) -> Diagnostic:
     nodes = tuple(form.graph.node_name(number) for number in part.nodes.values())
-    hint = (
-        "Leave the part out, or take one with smooth laws: a contact with a stiffness c, a brake that is on from t_on."
-    )
-    return Diagnostic("no SPICE form", f"{title(part.component)}: {error}.", hint, (part.name,), nodes)
+    return Diagnostic("no SPICE form", f"{title(part.component)}: {error}.", error.instead, (part.name,), nodes)
 
 
 def _stored(model: Model, initial: Any) -> dict[int, float]:
@@ -104,7 +105,7 @@ def _comments(part: GraphPart, parts: Mapping[str, SmoothedPart], form: StateFor
     component = part.component
     nodes = ", ".join(form.graph.node_name(part.nodes[port.name]) for port in component.ports)
     values = (
-        f"{name} = {value!r} {component.declared[name].unit}".removesuffix(" 1")
+        f"{name} = {value!r} {component.declared[name].unit}".removesuffix(" 1").replace(" ", UNBROKEN)
         for name, value in component.values.items()
         if isinstance(value, int | float)
     )
@@ -132,7 +133,7 @@ def _section(about: str, lines: Iterator[str]) -> list[str]:
 
 def _analysis(elements: Elements, form: StateForm, t_end: float, step: float) -> Iterator[str]:
     yield ""
-    yield ".options reltol=1e-6 abstol=1e-12 vntol=1e-9 chgtol=1e-18 method=trap"
+    yield f".options {OPTIONS}"
     yield f".tran {step!r} {t_end!r} 0 {step!r} uic"
     outer = dict.fromkeys(part.nodes[port.name] for part in form.graph.parts for port in part.component.ports)
     names = [elements.node(number) for number in outer if form.graph.node_name(number) != REFERENCE]
@@ -144,6 +145,5 @@ def _wrapped(lines: list[str]) -> Iterator[str]:
     """Lines of at most `WIDTH` signs; what is longer goes on behind a plus."""
     for line in lines:
         follows = "*   " if line.startswith("*") else "+   "
-        yield from textwrap.wrap(
-            line, WIDTH, subsequent_indent=follows, break_long_words=False, break_on_hyphens=False
-        ) or [""]
+        rows = textwrap.wrap(line, WIDTH, subsequent_indent=follows, break_long_words=False, break_on_hyphens=False)
+        yield from (row.replace(UNBROKEN, " ") for row in rows or [""])

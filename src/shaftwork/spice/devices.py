@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -39,6 +40,9 @@ LARGEST_EXPONENT = 80.0
 """Up to here a diode is exponential: 1e-14 A times e^80 is beyond any current."""
 DEAD_WITHOUT_CAPACITY = ("vj", "m", "fc", "eg", "xti", "tnom", "level")
 """Parameters of diodes that change nothing at 27 degrees Celsius where there is no capacity."""
+_LAW = re.compile(r"\S+\s+\S+\s+\S+\s+([vi])\s*=\s*(.+)", re.IGNORECASE)
+_READING = re.compile(r"\b([vi])\s*\(([^()]*)\)", re.IGNORECASE)
+_BRACES = str.maketrans("{}", "()")
 DeviceModel = tuple[NetlistLine, str, Mapping[str, str]]
 """Of a .model its line, its type and its parameters."""
 
@@ -86,6 +90,7 @@ class Devices:
             "t": self._line,
             "d": self._diode,
             "s": self._switch,
+            "b": self._expressed,
         }
         if kind not in makers:
             kinds = ", ".join(sorted(one.upper() for one in (*makers, "k", "x")))
@@ -153,6 +158,31 @@ class Devices:
     def _current(self, line: NetlistLine, name: str) -> None:
         p, n = self._ends(line)  # SPICE counts the current through the source, ours is delivered
         self.place(CurrentSource(name, i=source_law(line, self.values, self.span)), n, p)
+
+    def _expressed(self, line: NetlistLine, name: str) -> None:
+        """A B source; of voltages its law may read the one between its own nodes."""
+        match = _LAW.match(line.text)
+        if match is None:
+            raise line.error("a B source has two nodes and V=expression or I=expression")
+        kind, (p, n) = match[1].lower(), self._ends(line)
+        own = {f"{p},{n}": "(u_own)", f"{n},{p}": "(-u_own)"}
+        own |= {node: text for node, text in ((p, "(u_own)"), (n, "(-u_own)")) if {p, n} - {node} == {"0"}}
+
+        def read(reading: re.Match[str]) -> str:
+            nodes = ",".join(line.node(word.strip()) for word in reading[2].split(","))
+            if reading[1] in "iI" or nodes not in own or kind == "v":
+                raise line.error(
+                    f"its law reads {reading[0]}: laws of time are read, and of the voltage across the source where it "
+                    "gives a current. What is proportional to another voltage or current is an E, F, G or H"
+                )
+            return own[nodes]
+
+        text = _READING.sub(read, match[2]).translate(_BRACES)
+        law = self.values.law(line, text, u_own=u)
+        if kind == "v":
+            self._metered(line, name, law)
+        else:
+            self.place(CurrentSource(name, i=-law), p, n)
 
     def _controlled(self, line: NetlistLine, name: str) -> None:
         if len(line.words) != 6 or line.words[3].lower().startswith(("poly", "value", "vol", "cur", "table")):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from shaftwork.core.errors import ModelFileError
 from shaftwork.network.netlist import first_few
@@ -14,10 +15,26 @@ LARGEST_TEXT, MOST_ELEMENTS, DEEPEST = 2_500_000, 20_000, 20
 REFERENCES = ("0", "gnd")
 _WORD = re.compile(r"\{[^{}]*\}|'[^']*'|\"[^\"]*\"|[^\s(),={}'\"]+|[=(){}'\"]")
 _ELEMENT = re.compile(r"[rlcvi]\w*\s+\S+\s+\S+\s+(?:dc\s+)?[-+.\d]\S*$", re.IGNORECASE)
-ENDS = {"r": 2, "l": 2, "c": 2, "v": 2, "i": 2, "d": 2, "e": 4, "g": 4, "s": 4, "t": 4, "f": 2, "h": 2, "k": 0}
+ENDS = {"r": 2, "l": 2, "c": 2, "v": 2, "i": 2, "d": 2, "e": 4, "g": 4, "s": 4, "t": 4, "f": 2, "h": 2, "k": 0, "b": 2}
 """How many nodes an element has behind its name, by its first letter."""
 ANALYSES = (
-    *("ac", "dc", "disto", "fft", "four", "hb", "lin", "meas", "measure", "nodeset", "noise", "op", "opt", "option"),
+    *(
+        "ac",
+        "csparam",
+        "dc",
+        "disto",
+        "fft",
+        "four",
+        "hb",
+        "lin",
+        "meas",
+        "measure",
+        "nodeset",
+        "noise",
+        "op",
+        "opt",
+        "option",
+    ),
     *("options", "plot", "print", "probe", "pss", "pz", "save", "sens", "step", "tf", "title", "width"),
 )
 """Commands that change nothing in the circuit and its motion, which are left out."""
@@ -33,6 +50,25 @@ class LineError(ModelFileError):
 
 
 @dataclass(frozen=True)
+class Scope:
+    """The parameters of a circuit or of one instance of a subcircuit: they read each other, in whatever order.
+
+    Args:
+        outer: that of the circuit around it.
+        texts: by name the line that says a parameter, its text, and in which scope that is read.
+        numbers: what has been read of them so far, and what was given as numbers.
+    """
+
+    outer: Scope | None = None
+    texts: dict[str, tuple[NetlistLine, str, Scope]] = field(default_factory=dict)
+    numbers: dict[str, Any] = field(default_factory=dict)
+
+    def add(self, line: NetlistLine, pairs: Mapping[str, str], read_in: Scope) -> None:
+        """Take in the parameters of a line; a later one of a name wins, as in ngspice, but not over a number."""
+        self.texts.update({name: (line, text, read_in) for name, text in pairs.items() if name not in self.numbers})
+
+
+@dataclass(frozen=True)
 class NetlistLine:
     """A line with those that continue it.
 
@@ -42,7 +78,7 @@ class NetlistLine:
         words: names, numbers and expressions; "=" and parentheses are words of their own.
         prefix: of an element of a subcircuit, the name of this with a dot.
         nodes: of an element of a subcircuit, the nodes outside by those inside.
-        values: of an element of a subcircuit, its parameters as text.
+        scope: of an element of a subcircuit, its parameters.
     """
 
     number: int
@@ -50,7 +86,7 @@ class NetlistLine:
     words: tuple[str, ...]
     prefix: str = ""
     nodes: Mapping[str, str] = field(default_factory=dict)
-    values: tuple[Mapping[str, str], ...] = ()
+    scope: Scope | None = None
 
     def in_scope(self, name: str) -> Iterator[str]:
         """A name as it is in the subcircuit of this line, in that around it, and so on to the outermost."""
@@ -86,6 +122,17 @@ class NetlistLine:
             raise self.error(f"'{' '.join(words)}' is not of the form key=value key=value")
         return {key.lower(): value for key, value in zip(keys, values, strict=True)}
 
+    def parameters(self) -> dict[str, str]:
+        """What a .param says: expressions of several words too, with or without braces.
+
+        Raises:
+            LineError: it is not of the form name=expression.
+        """
+        before, *pairs = re.split(r"([A-Za-z_]\w*)\s*=", self.text)
+        if before.strip().lower() != self.command or not pairs:
+            raise self.error("parameters are written .param name=expression")
+        return {name.lower(): text.strip(" ,\t") for name, text in zip(pairs[::2], pairs[1::2], strict=True)}
+
 
 @dataclass(frozen=True)
 class Subcircuit:
@@ -114,7 +161,7 @@ def _plain_lines(text: str) -> Iterator[NetlistLine]:
         content, _, drawing = row.partition(";")
         hints = [hint.strip() for hint in drawing.split(",")]
         if content.strip() and content.strip()[0] not in "#%*" and "nosim" not in hints:
-            yield NetlistLine(number, content.strip(), tuple(_WORD.findall(content)))
+            yield NetlistLine(number, content.strip(), tuple(_WORD.findall(content)) or (content.strip(),))
 
 
 def _spice_lines(text: str) -> Iterator[NetlistLine]:
@@ -142,8 +189,8 @@ def _spice_lines(text: str) -> Iterator[NetlistLine]:
             yield line
 
 
-def flattened(lines: tuple[NetlistLine, ...]) -> tuple[NetlistLine, ...]:
-    """The lines with those of subcircuits in place of their instances.
+def flattened(lines: tuple[NetlistLine, ...], parameters: Scope) -> tuple[NetlistLine, ...]:
+    """The lines with those of subcircuits in place of their instances, around which are the parameters.
 
     Raises:
         LineError: a subcircuit is not there, does not end, has other nodes, or has too much in it.
@@ -151,7 +198,7 @@ def flattened(lines: tuple[NetlistLine, ...]) -> tuple[NetlistLine, ...]:
     everywhere = {word.lower(): word.lower() for line in lines if line.command == ".global" for word in line.words[1:]}
     outer, definitions = _definitions([line for line in lines if line.command != ".global"])
     flat: list[NetlistLine] = []
-    for line in _expanded(outer, definitions, everywhere, 0):
+    for line in _expanded(outer, definitions, everywhere, parameters, 0):
         flat.append(line)
         if len(flat) > MOST_ELEMENTS:
             raise line.error(f"there are more than {MOST_ELEMENTS} elements, with those of subcircuits")
@@ -170,7 +217,11 @@ def _definitions(lines: list[NetlistLine]) -> tuple[list[NetlistLine], dict[str,
             opening, inside = line, []
         elif line.command == ".ends" and opening is not None:
             definition = _subcircuit(opening, tuple(inside))
-            definitions[opening.words[1].lower()], opening = definition, None
+            if (first := definitions.setdefault(opening.words[1].lower(), definition)) is not definition:
+                raise opening.error(
+                    f"line {first.line.number} defines this subcircuit, too, and ngspice would take that. Rename one"
+                )
+            opening = None
         elif line.command == ".ends":
             raise line.error("no subcircuit begins before it")
         else:
@@ -194,7 +245,11 @@ def _before_pairs(line: NetlistLine, start: int) -> tuple[tuple[str, ...], int]:
 
 
 def _expanded(
-    lines: Sequence[NetlistLine], definitions: Mapping[str, Subcircuit], everywhere: Mapping[str, str], depth: int
+    lines: Sequence[NetlistLine],
+    definitions: Mapping[str, Subcircuit],
+    everywhere: Mapping[str, str],
+    outer: Scope,
+    depth: int,
 ) -> Iterator[NetlistLine]:
     for line in lines:
         if line.command[0] != "x":
@@ -214,8 +269,11 @@ def _expanded(
             raise line.error(f"subcircuits are inside each other more than {DEEPEST} times")
         prefix = f"{line.prefix}{line.words[0]}."
         outside = {**everywhere, **dict(zip(definition.nodes, map(line.node, nodes), strict=True))}
-        values = (*line.values, {**definition.values, **line.pairs(start)})
-        values += tuple(one.pairs(1) for one in definition.lines if one.command == ".param")  # each reads those before
+        scope = Scope(outer)
+        scope.add(definition.line, definition.values, scope)
+        scope.add(line, line.pairs(start), outer)
+        for one in (one for one in definition.lines if one.command == ".param"):
+            scope.add(one, one.parameters(), scope)
         circuit = (one for one in definition.lines if one.command != ".param")
-        inner = [NetlistLine(one.number, one.text, one.words, prefix, outside, values) for one in circuit]
-        yield from _expanded(inner, definitions, everywhere, depth + 1)
+        inner = [NetlistLine(one.number, one.text, one.words, prefix, outside, scope) for one in circuit]
+        yield from _expanded(inner, definitions, everywhere, scope, depth + 1)

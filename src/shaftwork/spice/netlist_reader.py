@@ -29,6 +29,7 @@ from shaftwork.spice.spice_numbers import NetlistValues
 Dialect = Literal["spice", "lcapy"]
 MOST_FAULTS = 8
 """Lines that an error lists; of more it says how many there are."""
+PARAMETERS = (".param", ".params", ".global_param")
 READING = (VoltageControlledVoltageSource, VoltageControlledCurrentSource, VoltageControlledSwitch)
 """Parts whose last two ends let no current pass."""
 OPEN = 1e12
@@ -143,10 +144,10 @@ class _NetlistReader:
     def __init__(self, text: str, values: Mapping[str, float], dialect: Dialect, ideal_diodes: bool) -> None:  # noqa: FBT001
         self._lcapy, self._ideal_diodes = dialect == "lcapy", ideal_diodes
         names = values if self._lcapy else {name.lower(): value for name, value in values.items()}
-        self._given, self._values = names, NetlistValues(names, lcapy=self._lcapy)
+        self._values = NetlistValues(names, lcapy=self._lcapy)
         self._title = "" if self._lcapy else (text.splitlines() or [""])[0].strip().lstrip("*").strip()
         lines = lines_of(text, lcapy=self._lcapy)
-        self._lines = with_joined_nodes(lines) if self._lcapy else flattened(lines)
+        self._lines = with_joined_nodes(lines) if self._lcapy else flattened(lines, self._values.parameters)
         self._models: dict[str, DeviceModel] = {}
         self._start_voltages: list[tuple[NetlistLine, str, str]] = []
         self._faults: list[LineError] = []
@@ -156,8 +157,14 @@ class _NetlistReader:
     def circuit(self, title: str) -> SpiceCircuit:
         """The circuit."""
         elements = [line for line in self._lines if line.command[0] != "."]
-        for line in (line for line in self._lines if line.command[0] == "."):
-            self._attempt(line, self._command)
+        for line in self._lines:
+            if line.command in PARAMETERS:
+                self._attempt(line, self._parameter)
+        for name, (line, *_) in [*self._values.parameters.texts.items()]:
+            self._attempt(line, lambda line, name=name: self._values.parameter(line, name))
+        for line in self._lines:
+            if line.command[0] == "." and line.command not in PARAMETERS:
+                self._attempt(line, self._command)
         devices = self._devices(elements)
         for line in sorted(elements, key=lambda line: _turn(self._kind(line))):
             self._attempt(line, devices.couple if self._kind(line) == "K" else devices.add)
@@ -196,17 +203,17 @@ class _NetlistReader:
             self._faults.append(error)
         except ParameterError as error:  # of a part whose values are out of their bounds
             self._faults.append(line.error(str(error)))
+        except RecursionError:
+            self._faults.append(line.error("its parameters read others, and these others, more than 100 deep"))
+
+    def _parameter(self, line: NetlistLine) -> None:
+        self._values.parameters.add(line, line.parameters(), self._values.parameters)
 
     def _command(self, line: NetlistLine) -> None:
         command = line.command[1:]
         if command in ANALYSES:
             return
         match command:
-            case "param" | "params" | "global_param":
-                for name, text in line.pairs(1).items():
-                    value = self._values.number(line, text)
-                    if name not in self._given:
-                        self._values.parameters[name] = value
             case "model":
                 self._model(line)
             case "ic":
@@ -219,7 +226,9 @@ class _NetlistReader:
     def _model(self, line: NetlistLine) -> None:
         if len(line.words) < 3:
             raise line.error("a model has a name and a type")
-        self._models[f"{line.prefix}{line.words[1]}".lower()] = line, line.words[2].lower(), line.pairs(3)
+        model = line, line.words[2].lower(), line.pairs(3)
+        if (first := self._models.setdefault(f"{line.prefix}{line.words[1]}".lower(), model)) is not model:
+            raise line.error(f"line {first[0].number} has this model, too, and ngspice would take that. Rename one")
 
     def _starts(self, line: NetlistLine) -> None:
         words = [word for word in line.words[1:] if word not in "(),"]

@@ -14,6 +14,7 @@ from sympy import Expr, Piecewise, Symbol, tanh
 from sympy.core.relational import Relational
 
 from shaftwork.components.branches import ACROSS, THROUGH
+from shaftwork.components.controlled import VoltageControlledSwitch
 from shaftwork.components.friction import SLIPPING, STUCK
 from shaftwork.components.laws import t
 from shaftwork.components.modes import Modes, mode_symbol
@@ -23,6 +24,11 @@ from shaftwork.spice.spice_laws import NoSpiceFormError
 
 SMOOTH, CONDUCTING, BLOCKING = (Symbol(f"{{{name}}}") for name in ("smooth", "g_on", "g_off"))
 """Parameters of a deck: speed over which a friction changes its sign, conductances of what conducts and blocks."""
+
+INSTEAD = (
+    "Take a part with smooth laws: a contact with a stiffness c, a brake that is on from t_on, an AveragedBLDC, whose "
+    "laws are the means of a BLDCMotor over its commutations."
+)
 
 
 @dataclass(frozen=True)
@@ -49,7 +55,7 @@ def smoothed(part: GraphPart, graph: CircuitGraph) -> SmoothedPart:
     laws: dict[int, Expr] = {}
     added: list[tuple[Expr, int, int]] = []
     notes: list[str] = []
-    for machine in part.modes:
+    for machine in () if isinstance(part.component, VoltageControlledSwitch) else part.modes:  # that is an S element
         moded = [graph.branches[k] for k in part.branches if mode_symbol(machine.symbol) in _symbols(graph.branches[k])]
         if machine.law is not None:
             (branch,) = moded
@@ -64,7 +70,7 @@ def smoothed(part: GraphPart, graph: CircuitGraph) -> SmoothedPart:
             notes.append("g_on while it conducts, g_off while it blocks")
         else:
             names = ", ".join(dict.fromkeys(mode.words for mode in machine.options))
-            raise NoSpiceFormError(f"it changes between the modes {names}, which no law of SPICE stands for")
+            raise NoSpiceFormError(f"it changes between the modes {names}, which no law of SPICE stands for", INSTEAD)
     return SmoothedPart(laws, tuple(added), tuple(notes))
 
 
@@ -104,7 +110,8 @@ def _rubbing(machine: Modes, branches: list[GraphBranch]) -> dict[int, Expr]:
     for branch in branches:
         law = branch.template.law
         if branch.template.kind is Kind.COUPLING:
-            raise NoSpiceFormError("the ratio of its coupling depends on its mode, which no law of SPICE stands for")
+            why = "the ratio of its coupling depends on its mode, which no law of SPICE stands for"
+            raise NoSpiceFormError(why, "Take a Gear, and a Damper or CoulombLoad for what it loses.")
         if all(law.subs(mode, value) == 0 for value in (1, -1, 0)):  # it carries an angle alone
             laws[branch.index] = sympy.S.Zero
             continue

@@ -8,9 +8,10 @@ from collections.abc import Iterator, Mapping
 from sympy import Expr, Float, Symbol
 
 from shaftwork.components.branches import ACROSS, INTEGRAL
+from shaftwork.components.controlled import VoltageControlledSwitch
 from shaftwork.components.discontinuities import breakpoints
 from shaftwork.components.laws import replaced, t
-from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, readings_of
+from shaftwork.network.graph import GROUND, CircuitGraph, GraphBranch, GraphPart, readings_of, resolve
 from shaftwork.network.kinds import Kind
 from shaftwork.network.netlist import by_part, unused
 from shaftwork.spice.smoothed_modes import SmoothedPart
@@ -75,10 +76,14 @@ class Elements:
         """The label of a node."""
         return "0" if number == GROUND else self._labels.of("", self._graph.nodes[number])
 
-    def of_part(self, name: str, branches: tuple[int, ...]) -> Iterator[str]:
+    def of_part(self, part: GraphPart) -> Iterator[str]:
         """The lines of the elements of a part."""
-        smoothed = self._parts.get(name, SmoothedPart())
-        lines = (branch for branch in (self._graph.branches[k] for k in branches) if not self._is_end_of_line(branch))
+        if isinstance(part.component, VoltageControlledSwitch):
+            yield from self._switch(part)
+            return
+        name, smoothed = part.name, self._parts.get(part.name, SmoothedPart())
+        branches = (self._graph.branches[k] for k in part.branches)
+        lines = (branch for branch in branches if not self._is_end_of_line(branch))
         for branch in lines:
             yield from self._of_branch(branch, smoothed.laws.get(branch.index))
         for law, plus, minus in smoothed.added:
@@ -114,6 +119,13 @@ class Elements:
     def _of_line(self, branch: GraphBranch) -> list[int]:
         """The branches of lines in its part."""
         return [k for k in self._graph.part_of(branch.index).branches if self._graph.branches[k].template.line]
+
+    def _switch(self, part: GraphPart) -> Iterator[str]:
+        label, values = self._labels.of("element", part.name), resolve(part.component)[0]
+        ends = " ".join(self.node(part.nodes[port.name]) for port in part.component.ports)
+        pairs = (("vt", "u_t"), ("vh", "u_h"), ("ron", "R_on"), ("roff", "R_off"))
+        yield f"S{label} {ends} {label}"
+        yield f".model {label} sw({' '.join(f'{key}={values[name]!r}' for key, name in pairs)})"
 
     def _of_branch(self, branch: GraphBranch, law: Expr | None) -> Iterator[str]:
         template = branch.template

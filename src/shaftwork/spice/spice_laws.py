@@ -29,7 +29,11 @@ SAME_NAME = ("Abs", "acos", "asin", "atan", "cos", "cosh", "exp", "sin", "sinh",
 
 
 class NoSpiceFormError(Exception):
-    """What an expression or a part has that ngspice has not."""
+    """What an expression or a part has that ngspice has not, and what to take instead."""
+
+    def __init__(self, why: str, instead: str) -> None:
+        super().__init__(why)
+        self.instead = instead
 
 
 class _SpicePrinter(StrPrinter):  # type: ignore[misc]
@@ -109,7 +113,8 @@ class _SpicePrinter(StrPrinter):  # type: ignore[misc]
     def _print_Function(self, function: Any) -> str:
         name = type(function).__name__
         if name not in SAME_NAME:
-            raise NoSpiceFormError(f"a law has the function {name}, which ngspice does not have")
+            instead = f"Write it without {name}, or as a Table."
+            raise NoSpiceFormError(f"a law has the function {name}, which ngspice does not have", instead)
         arguments = ", ".join(map(self._print, function.args))
         return f"{name.lower()}({arguments})"
 
@@ -201,7 +206,8 @@ def _table(noise: Expr, t_end: float, edge: float) -> Expr:
     argument = noise.args[0].xreplace({floor: floor.args[0] for floor in noise.args[0].atoms(sympy.floor)})
     rate, start = argument.diff(t), argument.subs(t, 0)
     if noise.free_symbols != {t} or not rate.is_number or not 0 < float(rate) * t_end < MOST_NUMBERS:
-        raise NoSpiceFormError(f"a law has noise over an angle, or over time more than {MOST_NUMBERS} numbers of it")
+        why = f"a law has noise over an angle, or over time more than {MOST_NUMBERS} numbers of it"
+        raise NoSpiceFormError(why, "Take slower noise over time, or a Table.")
     first, last = math.floor(start), math.ceil(start + rate * t_end)
 
     def value(place: float) -> float:

@@ -12,7 +12,7 @@ from sympy import Expr
 from shaftwork.components.laws import t
 from shaftwork.core.errors import ModelFileError
 from shaftwork.network.expressions import parse
-from shaftwork.spice.netlist_lines import NetlistLine
+from shaftwork.spice.netlist_lines import NetlistLine, Scope
 
 SCALES = {"t": 1e12, "g": 1e9, "meg": 1e6, "k": 1e3, "mil": 25.4e-6, "m": 1e-3, "u": 1e-6, "µ": 1e-6, "μ": 1e-6}
 SCALES |= {"n": 1e-9, "p": 1e-12, "f": 1e-15}
@@ -35,12 +35,13 @@ class NetlistValues:
     """Reads numbers and laws, with the parameters that they name.
 
     Args:
-        parameters: by name, without case in SPICE.
-        lcapy: whether names have case, and suffixes do not exist.
+        given: numbers by name, without case in SPICE, which win over parameters.
+        lcapy: whether names have case, suffixes do not exist, and time is t.
     """
 
-    def __init__(self, parameters: Mapping[str, float], *, lcapy: bool) -> None:
-        self.parameters, self._lcapy = dict(parameters), lcapy
+    def __init__(self, given: Mapping[str, float], *, lcapy: bool) -> None:
+        self.parameters, self._lcapy = Scope(numbers={name: sympy.Float(value) for name, value in given.items()}), lcapy
+        """Those of the whole circuit."""
         self.missing: dict[str, NetlistLine] = {}
         """Names without a value, and where they stand."""
 
@@ -50,47 +51,66 @@ class NetlistValues:
         Raises:
             LineError: it is none, or not finite.
         """
-        plain = number_in(text)
-        law = sympy.Float(plain) if plain is not None and math.isfinite(plain) else self.law(line, text)
-        if law.has(t):
-            raise line.error(f"'{text}' depends on time t, where a number is needed")
-        value = float(law)
-        if not math.isfinite(value):
-            raise line.error(f"'{text}' is no finite number")
-        return value
+        return float(self._constant(line, text, line.scope or self.parameters))
 
-    def law(self, line: NetlistLine, text: str) -> Expr:
-        """A number or an expression of time.
+    def _constant(self, line: NetlistLine, text: str, scope: Scope) -> Expr:
+        plain = number_in(text)
+        law = (
+            sympy.Float(plain)
+            if plain is not None and math.isfinite(plain)
+            else self._expression(line, text, scope, {})
+        )
+        if law.has(t):
+            raise line.error(f"'{text}' depends on time, where a number is needed")
+        if not math.isfinite(float(law)):
+            raise line.error(f"'{text}' is no finite number")
+        return sympy.Float(float(law))
+
+    def law(self, line: NetlistLine, text: str, **known: Expr) -> Expr:
+        """A number or an expression of time, and of names that stand for something known.
 
         Raises:
             LineError: it is none, or names what has no value.
         """
-        return self._expression(line, text, tuple(reversed(line.values)))
+        return self._expression(line, text, line.scope or self.parameters, known)
 
-    def _expression(self, line: NetlistLine, text: str, scopes: tuple[Mapping[str, str], ...]) -> Expr:
+    def parameter(self, line: NetlistLine, name: str, scope: Scope | None = None) -> Expr:
+        """A parameter by name, by default of the whole circuit.
+
+        Raises:
+            LineError: its text is no number.
+        """
+        inner = scope or self.parameters
+        while name not in {**inner.numbers, **inner.texts} and inner.outer is not None:
+            inner = inner.outer
+        if name in inner.texts:  # while it is read it is not there: one that reads itself has no value
+            said, text, read_in = inner.texts.pop(name)
+            inner.numbers[name] = self._constant(said, text, read_in)
+        if name not in inner.numbers:
+            self.missing.setdefault(name, line)
+        return inner.numbers.get(name, sympy.Float(1.0))
+
+    def _expression(self, line: NetlistLine, text: str, scope: Scope, known: Mapping[str, Expr]) -> Expr:
         inner = text.strip().strip("{}'\"").strip()
         inner = inner if self._lcapy else _IN_TEXT.sub(_plain, inner.lower())
         inner = re.sub(r"\b([A-Za-z]+)\s*\(", lambda match: f"{FUNCTIONS.get(match[1], match[1])}(", inner)
-        names = [name for name in dict.fromkeys(_NAME.findall(inner.replace("^", "**"))) if name != "t"]
         called = {match[1] for match in re.finditer(r"([A-Za-z_]\w*)\s*\(", inner)}  # only asked for membership
-        symbols = {name: sympy.Symbol(name, real=True) for name in names if name not in called and name != "pi"}
+        known = {"t" if self._lcapy else "time": t, **known}
+        names = [name for name in dict.fromkeys(_NAME.findall(inner)) if name not in called and name != "pi"]
+        symbols = {name: sympy.Symbol(name, real=True) for name in names}
         try:
-            law = parse(inner.replace("^", "**"), (t, *symbols.values()))
+            law = parse(inner.replace("^", "**"), symbols.values())
         except ModelFileError as error:
             raise line.error(f"'{text}' cannot be read: {str(error).splitlines()[0]}") from None
-        read = {symbol: self._parameter(line, name, scopes) for name, symbol in symbols.items() if law.has(symbol)}
+        read = {
+            symbol: known[name] if name in known else self.parameter(line, name, scope)
+            for name, symbol in symbols.items()
+            if law.has(symbol)
+        }
         value: Expr = law.xreplace(read)
-        if value.has(sympy.nan, sympy.oo, sympy.zoo, -sympy.oo, sympy.I) or value.free_symbols - {t}:
+        if value.has(sympy.nan, sympy.oo, sympy.zoo, -sympy.oo, sympy.I):
             raise line.error(f"'{text}' is not finite and real")
         return value
-
-    def _parameter(self, line: NetlistLine, name: str, scopes: tuple[Mapping[str, str], ...]) -> Expr:
-        for k, scope in enumerate(scopes):
-            if name in scope:  # it is written in what is around the subcircuit
-                return self._expression(line, scope[name], scopes[k + 1 :])
-        if name not in self.parameters:
-            self.missing.setdefault(name, line)
-        return sympy.Float(self.parameters.get(name, 1.0))
 
 
 def _plain(match: re.Match[str]) -> str:

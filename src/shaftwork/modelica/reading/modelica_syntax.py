@@ -8,6 +8,8 @@ from shaftwork.modelica.reading.modelica_tokens import TokenCursor, fault, token
 
 CLASSES = ("model", "block", "package", "class", "connector", "record", "function", "type", "operator")
 _BEFORE_CLASSES = ("encapsulated", "partial", "final", "redeclare", "replaceable", "inner", "outer", "pure", "impure")
+_BLOCKS = ("if", "for", "when", "while")
+_READ = "Read are declarations and connect(...): write what it does as parts, or as blocks of Modelica.Blocks.Sources."
 _PREFIXES = ("parameter", "constant", "final", "inner", "outer", "input", "output", "flow", "discrete", "replaceable")
 
 
@@ -122,27 +124,38 @@ class _Parser(TokenCursor):
         result = ClassText(kind, name.text, name.line)
         if self._accept("="):  # a class that is another one, or an enumeration
             result.faults.append((name.line, f"'{name.text}' stands for another class, which is not read."))
-            self._skip_to_semicolon()
+            self._skip_to(";")
             return result
         self._comment()
-        self._deeper(lambda: self._body(result))
+        if kind == "function":  # what calls it is refused
+            while not (self._accept("end") and self._at(name.text)):
+                if self._take().kind == "end":
+                    raise fault(name.line, f"'{name.text}' has no end.")
+            self._take()
+        else:
+            self._deeper(lambda: self._body(result))
         return result
 
     def _body(self, result: ClassText) -> None:
-        equations = False
+        section = ""
         while not self._accept("end"):
+            line = self._next.line
             if self._next.kind == "end":
                 raise fault(result.line, f"'{result.name}' has no end.")
             if self._accept("public", "protected"):
-                equations = False
-            elif self._accept("equation"):
-                equations = True
-            elif self._at("annotation"):
-                self._take()
+                section = ""
+            elif self._at("initial", "equation", "algorithm"):
+                begins = "initial " * (self._accept("initial") is not None)
+                section = begins + self._take().text
+                if section != "equation":
+                    result.faults.append((line, f"an {section} section is not read. {_READ}"))
+            elif self._accept("annotation"):
                 self._annotation(result)
                 self._accept(";")
-            elif equations:
+            elif section == "equation":
                 self._equation(result)
+            elif section:
+                self._skip_statement()
             else:
                 self._element(result)
         end = self._name()
@@ -173,7 +186,8 @@ class _Parser(TokenCursor):
             self._comment()
             self._expect(";")
             return
-        result.faults.append((line, "an equation other than connect(...) is not read."))
+        what = {"if": "an if equation", "for": "a for loop", "when": "a when equation", "while": "a while loop"}
+        result.faults.append((line, f"{what.get(self._next.text, 'an equation')} is not read. {_READ}"))
         self._skip_statement()
 
     def _connector(self, result: ClassText) -> str:
@@ -191,25 +205,23 @@ class _Parser(TokenCursor):
             if self._next.kind == "end":
                 raise fault(line, f"'{sign}' is expected behind this.")
 
-    def _skip_to_semicolon(self) -> None:
-        self._skip_to(";")
-
     def _skip_statement(self) -> None:
-        """An equation, with all inside it where it is an if, for or when."""
-        depth = 0
+        """An equation or statement, with all inside it where it is an if, for, when or while."""
+        depth, brackets, begins, has_equals = 0, 0, True, False
         while True:
             token = self._take()
             if token.kind == "end":
                 raise fault(token.line, "an equation has no end.")
-            if (token.kind == "name" and token.text in ("for", "when", "while")) or (
-                token.text == "if" and self._tokens[self._place - 2].text in (";", "equation", "then", "else", "loop")
-            ):
+            if begins and token.text in _BLOCKS:
                 depth += 1
-            elif token.text == "end" and self._at("for", "if", "when", "while"):
-                self._take()
+            elif begins and token.text == "end" and self._accept(*_BLOCKS):
                 depth -= 1
-            if (token.text == ";" and depth <= 0) or (self._at(";") and depth <= 0 and self._accept(";")):
+            if token.text == ";" and depth <= 0:
                 return
+            brackets += {"(": 1, ")": -1}.get(token.text, 0)
+            has_equals = token.text != ";" and (has_equals or token.text in ("=", ":="))
+            opens = token.text in ("then", "else", "loop") and not brackets and not has_equals  # of no if expression
+            begins = token.text == ";" or opens
 
     def _element(self, result: ClassText) -> None:
         line = self._next.line
@@ -219,22 +231,14 @@ class _Parser(TokenCursor):
             base = self._dotted()
             if "Icons" not in base.split("."):
                 result.faults.append((line, f"it extends '{base}', which is not read."))
-            self._skip_to_semicolon()
-        elif self._at("initial", "algorithm"):
-            result.faults.append((line, f"an {self._take().text} section is not read."))
-            self._skip_section()
+            self._skip_to(";")
+        elif self._at(*_BLOCKS):
+            raise fault(line, f"'{self._next.text}' stands where declarations do. {_READ}")
         elif self._begins_class():
             result.classes.append(self._class())
             self._accept(";")
         else:
             self._declarations(result)
-
-    def _skip_section(self) -> None:
-        self._accept("equation", "algorithm")
-        while not self._at("public", "protected", "equation", "algorithm", "initial", "annotation"):
-            if self._at("end") or self._next.kind == "end":
-                return
-            self._skip_statement()
 
     def _import(self, result: ClassText) -> None:
         name = self._dotted()
@@ -245,7 +249,7 @@ class _Parser(TokenCursor):
             self._accept("*")
             alias = "*"
         result.imports[alias] = name
-        self._skip_to_semicolon()
+        self._skip_to(";")
 
     def _declarations(self, result: ClassText) -> None:
         prefixes: list[str] = []
@@ -266,7 +270,7 @@ class _Parser(TokenCursor):
             if not self._accept(","):
                 break
         if self._accept("constrainedby"):
-            self._skip_to_semicolon()
+            self._skip_to(";")
             return
         self._expect(";")
 
@@ -369,6 +373,8 @@ class _Parser(TokenCursor):
             if named:
                 self._place += 2
             value = self.expression()
+            if self._at("for"):
+                raise fault(self._next.line, "an array that 'for' makes is not read. Write its values one by one.")
             if self._accept(":"):
                 value, named = self.expression(), True
             rows[-1].append(SyntaxTerm("named or range", "", (value,), value.line) if named else value)
