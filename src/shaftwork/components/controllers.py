@@ -175,7 +175,8 @@ class Controller(Component):
         n, k, m = len(A), len(self.measured.names), len(self.acts.names)
         for name, matrix, shape in (("A", A, (n, n)), ("B", B, (n, k)), ("C", C, (m, n)), ("D", D, (m, k))):
             if matrix.shape != shape:
-                hint = " Name what each output is: acts=['torque', 'torque']." if name in "CD" and len(matrix) > m else ""
+                more = name in "CD" and len(matrix) > m
+                hint = " Name what each output is: acts=['torque', 'torque']." if more else ""
                 raise ParameterError(
                     f"{title}: {name} has the shape {matrix.shape} and must have {shape}, as A has {n} rows and "
                     f"{k} measured quantities lead to {m} outputs ({', '.join(self.acts.names)}).{hint}"
@@ -276,8 +277,8 @@ class StateSpaceController(Controller):
         needed = {"A, B and C, or D": self.D} if not n else {"B": self.B, "C": self.C}
         if missing := [names for names, gains in needed.items() if gains is None]:
             raise ParameterError(
-                f"StateSpaceController '{self.name}': {missing[0]} must be given, else it does nothing. A gain alone is "
-                "D = [[2.0]]; a PI controller has A = 0, B = 1, C = k_i, D = k_p."
+                f"StateSpaceController '{self.name}': {missing[0]} must be given, else it does nothing. A gain alone "
+                "is D = [[2.0]]; a PI controller has A = 0, B = 1, C = k_i, D = k_p."
             )
         sized = ((self.A, (n, n)), (self.B, (n, k)), (self.C, (m, n)), (self.D, (m, k)))
         A, B, C, D = (
@@ -345,8 +346,8 @@ class TransferFunctionController(Controller):
         n = below.size - 1
         if above.size > below.size:
             raise ParameterError(
-                f"{title}: its denominator is of degree {n}, below the numerator's {above.size - 1}, and no states give "
-                "such an output. Add a fast pole: k_d s is k_d s / (T s + 1)."
+                f"{title}: its denominator is of degree {n}, below the numerator's {above.size - 1}, and no states "
+                "give such an output. Add a fast pole: k_d s is k_d s / (T s + 1)."
             )
         with np.errstate(over="ignore"):
             above, below = above / below[0], below / below[0]
