@@ -237,7 +237,8 @@ def test_modes_are_those_of_now() -> None:
     assert run.modes == {"load": "stuck"}
     run.set("motor.tau", 30.0)
     course(run, (), 10, 0.1)
-    assert run.modes == {"load": "forward"}
+    assert run.modes == {"load": "slipping forward"}
+    assert run.modes == NETWORKS["friction"](30.0).simulate(1.0).phases[-1].modes
 
 
 def test_a_stepped_motion_goes_on_from_another_one() -> None:
@@ -273,6 +274,7 @@ def test_a_hundred_hundredths_are_one() -> None:
         (lambda run: run.set("motor.tau", float("nan")), sw.ParameterError, "must be a finite number"),
         (lambda run: run.set("motor.tau", sin(T)), sw.ParameterError, "must be a number here"),
         (lambda run: run.set("J1.J", -1.0), sw.ParameterError, "must be"),
+        (lambda run: run.set("J1.J", 0.0), sw.CompileError, "inertia matrix of the parts 'J1' is singular"),
         (lambda run: run.step(0.0), sw.ParameterError, "dt = 0.0 must be above 0"),
         (lambda run: run.step(-1.0), sw.ParameterError, "above 0"),
         (lambda run: run.step(float("nan")), sw.ParameterError, "finite"),
@@ -310,6 +312,7 @@ def test_what_is_wrong_is_said_and_changes_nothing(
         ({"rtol": -1.0}, "rtol"),
         ({"t_start": "now"}, "t_start"),
         ({"initial": 3.0}, "must map"),
+        ({"t_eval": 3}, r"start\(\) has no option 't_eval'. It has: inputs, t_start"),
     ],
 )
 def test_wrong_options_are_refused_at_the_start(options: dict[str, object], words: str) -> None:

@@ -45,6 +45,7 @@ def hybrid_moment(
     def bind(p: Array) -> BoundArrays:
         return equations.bound(p)
 
+    modes = list(zip(regime.machines, regime.modes, strict=True))
     problem = tightened_for(run.problem(t, state), "heyoka")
     return Moment(
         model=regime.model,
@@ -57,6 +58,7 @@ def hybrid_moment(
         bind=bind,
         stored=stored,
         parameters={**model.parameters, **values},
-        modes={machine.name: name for machine, name in zip(regime.machines, regime.modes, strict=True)},
+        modes={machine.name: name for machine, name in modes},
+        words={machine.name: machine.modes[name].words for machine, name in modes},
         steps=smooth_steps(regime.model, problem, demand, place),
     )

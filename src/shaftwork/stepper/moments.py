@@ -128,6 +128,7 @@ class Moment:
         stored: from the equations, a time in s and the states to all that is stored.
         parameters: of the network, by name.
         modes: by element that changes its mode.
+        words: the same as phases name them.
         steps: by which it goes on while nothing happens, or None where there are none.
     """
 
@@ -142,6 +143,7 @@ class Moment:
     stored: Callable[[Callable[[], BoundArrays], float, Array], Mapping[str, float]]
     parameters: Mapping[str, float]
     modes: Mapping[str, str] = field(default_factory=dict)
+    words: Mapping[str, str] = field(default_factory=dict)
     steps: Any = None
 
     def __post_init__(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -83,7 +84,13 @@ class Simulation:
         rtol: float = 1e-8,
         atol: float | Sequence[float] | None = None,
         engine: str = "auto",
+        **others: Any,
     ) -> None:
+        if others:
+            raise ParameterError(
+                f"start() has no option {next(iter(others))!r}. It has: inputs, t_start, initial, parameters, rtol, "
+                "atol, engine. What a step leads to is read after it, run['J2.omega']."
+            )
         if not model.form.waves:
             check(engine)
         if parameters is not None and not isinstance(parameters, Mapping):
@@ -119,8 +126,8 @@ class Simulation:
 
     @property
     def modes(self) -> Mapping[str, str]:
-        """The mode of every part that changes its mode; empty where none does."""
-        return dict(self._now.modes)
+        """The mode of every part that changes its mode, in the words of `Solution.phases`; empty where none does."""
+        return dict(self._now.words)
 
     def __getitem__(self, name: str) -> Any:
         """A quantity now, "J2.omega", in SI: after whatever jumps at this instant, with the inputs that are set.
@@ -148,14 +155,23 @@ class Simulation:
 
         Raises:
             ParameterError: there is none of this name, or the value is not admissible.
+            CompileError: the network has no motion with it.
             SimulationError: the motion has failed before.
         """
         self._refuse_failed()
-        moment, settings = self._moment, self._settings
+        moment, settings, before = self._moment, copy(self._settings), dict(vars(self))
         same = settings.set(name, value)
+        self._settings = settings
         # one that is only looked at is left, so that looking changes no bit of what follows
-        if not (self._moved and same and moment is not None and moment.set(name, settings.values[name])):
+        if self._moved and same and moment is not None and moment.set(name, settings.values[name]):
+            return
+        try:
             self._leave(moment)
+            if not same or not all(name in readings.in_laws for readings in self._cached.values()):
+                _ = self._now
+        except ShaftworkError:
+            vars(self).update(before)
+            raise
 
     def step(self, dt: float) -> None:
         """Go on by a time.
