@@ -12,12 +12,11 @@ import numpy as np
 from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError
 from shaftwork.core.parameters import in_si
 from shaftwork.integrate.choice import check
-from shaftwork.integrate.engines import available
 from shaftwork.pipeline.arguments import Demand, Given, Names, relative_tolerance
 from shaftwork.pipeline.motion_start import ending_of, handed_over, time_of_start
 from shaftwork.results.solution import Solution
 from shaftwork.stepper.input_values import Settings
-from shaftwork.stepper.moments import SMOOTH, Moment, MomentState, Observations, plain_moment
+from shaftwork.stepper.moments import Moment, MomentState, Observations, plain_moment, smooth_engine
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.model import Model
@@ -96,7 +95,7 @@ class Simulation:
         if parameters is not None and not isinstance(parameters, Mapping):
             raise ParameterError(f"parameters = {parameters!r} must map names to values, such as {{'shaft.c': 3e4}}.")
         self._options = Demand((0.0, 1.0), relative_tolerance(rtol), atol, None, engine, MOST_STEPS, None)
-        self._is_smooth = engine in SMOOTH and available("heyoka")
+        self._is_smooth = bool(smooth_engine(engine))
         self._settings = Settings(model, parameters, inputs)
         self._cached: dict[Any, Observations] = {}
         started: Any = ending_of(initial, model.form.graph) if isinstance(initial, Solution) else initial
