@@ -104,7 +104,7 @@ def test_steps_of_a_scene_are_one_run_and_come_back_to_the_last_bit(name: str) -
             assert error(value, wanted[signal], k) < 1e-9, (signal, k)
 
 
-@pytest.mark.parametrize("engine", ["auto", "scipy"])
+@pytest.mark.parametrize("engine", ["auto", "numba", "scipy"])
 @pytest.mark.parametrize(
     "name", [name if name == "gap" else pytest.param(name, marks=pytest.mark.slow) for name in NETWORKS]
 )
@@ -230,6 +230,27 @@ def test_looking_changes_no_bit() -> None:
             run.step(0.03)
             assert not looks or run.save_state().t == run.t
     assert [runs[0][name] for name in runs[0].names] == [runs[1][name] for name in runs[1].names]
+
+
+@pytest.mark.parametrize("engine", ["numba", "scipy", pytest.param("sundials", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["gap", pytest.param("brake", marks=pytest.mark.slow)])
+def test_every_engine_comes_back_to_the_last_bit(name: str, engine: str) -> None:
+    names = ("J1.omega", "J2.omega", "shaft.tau")
+
+    def start() -> Simulation:
+        return NETWORKS[name](5.0).compile().start(inputs=["motor.tau"], engine=engine)
+
+    def on(run: Simulation) -> list[list[object]]:
+        run.set("motor.tau", 9.0)
+        return course(run, names, 20, 0.02)
+
+    run = start()
+    course(run, names, 20, 0.02)
+    state = pickle.loads(pickle.dumps(run.save_state()))  # noqa: S301
+    wanted, other = on(run), start()
+    for again in (run, run, other):
+        again.restore(state)
+        assert on(again) == wanted
 
 
 def test_modes_are_those_of_now() -> None:

@@ -202,8 +202,7 @@ class Simulation:
     def save_state(self) -> SavedState:
         """All that the motion goes on with from here, to come back with `restore`; it pickles.
 
-        What follows is the same to the last bit, with heyoka and where no part changes its mode. With other engines a
-        motion through phases is the same to rounding, as equations that are used often get faster code.
+        What follows is the same to the last bit, with each engine.
         """
         place = self._moment.place if self._moved and self._moment is not None else None
         values = dict(self._settings.values)
