@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -110,7 +111,10 @@ def test_units_in_the_head_are_converted_to_those_that_are_wanted(tmp_path: Path
     curve = sw.Table.from_csv(path, "t", y, delimiter=";", decimal=",", units=("s", "rad/s"))
     assert curve.xs == pytest.approx((0.0, 0.5005), rel=1e-15)
     assert curve.ys == pytest.approx((0.0, 2 * np.pi), rel=1e-15)
-    assert sw.Table.from_csv(path, "t", y, delimiter=";", decimal=",").ys == (0.0, 60.0)
+    with pytest.warns(sw.NetworkWarning, match="in (ms|rpm), and its numbers stand as they are"):
+        assert sw.Table.from_csv(path, "t", y, delimiter=";", decimal=",").ys == (0.0, 60.0)
+    same = sw.Table.from_csv(path, "t", y, delimiter=";", decimal=",", units=("ms", "rpm"))
+    assert same == sw.Table([0.0, 500.5], [0.0, 60.0])
 
 
 @pytest.mark.parametrize(
@@ -160,7 +164,9 @@ def test_mutated_records_are_read_or_refused(tmp_path: Path) -> None:
         signs = {"delimiter": ";", "decimal": ","} if ";" in text else {}
         units = chance.choice(((None, None), ("s", "rad/s"), ("s", "N*m")))
         try:
-            curve = sw.Table.from_csv(path, units=units, **signs)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", sw.NetworkWarning)
+                curve = sw.Table.from_csv(path, units=units, **signs)
         except sw.ParameterError:
             continue
         assert np.isfinite([*curve.xs, *curve.ys]).all()
@@ -191,6 +197,54 @@ def test_times_of_laws_take_units_and_values_refuse_them() -> None:
     ):
         with pytest.raises(sw.ParameterError, match=r"newton|N m"):
             make()
+
+
+EXCEL = b"sep=;\r\n" + "Zeit [ms];Drehzahl [U/min];Temp. [°C]\r\n0;0;20,5\r\n500;60;20,5\r\n".encode("cp1252")
+CATMAN = "\ufeff# Start: 01.03.2026\nZeit\tDrehzahl\nms\trpm\n0,0\t0,0\n5,0e2\t60,0\n".encode()
+LABVIEW = "time_ms\tspeed_rpm\r\n0\t0\r\n500\t60\r\n".encode("utf-16")
+SCOPE = b"Time,Channel A\n(ms),(rpm)\n\n0.0,0.0\n500.0,60.0\n"
+SETTINGS = b'Model,X1\nSample rate,2000\nRun (3),"a, b"\n\nt [ms],n [rpm]\n0,0\n500,60\n'
+STAMPS = b'"when";"n (rpm)"\n"2026-03-01 12:00:00,000";"0"\n"2026-03-01 12:00:00,500";"60"\n'
+
+
+@pytest.mark.parametrize(
+    ("content", "columns", "signs"),
+    [
+        (EXCEL, ("Zeit", "Drehzahl"), ";,"),
+        (CATMAN, ("Zeit", "Drehzahl"), "\t,"),
+        (LABVIEW, ("time_ms", "speed"), "\t."),
+        (SCOPE, ("Time", "Channel A"), ",."),
+        (SETTINGS, ("t", "n"), ",."),
+        (STAMPS, ("when", "n"), ";,"),
+    ],
+    ids=["spreadsheet", "units below", "UTF-16", "units in brackets below", "settings above", "time stamps"],
+)
+def test_files_of_six_loggers_are_read_by_names_and_by_numbers(
+    tmp_path: Path, content: bytes, columns: tuple[str, str], signs: str
+) -> None:
+    path = tmp_path / "logger.csv"
+    path.write_bytes(content)
+    for x, y in (columns, (0, 1)):
+        curve = sw.Table.from_csv(path, x, y, delimiter=signs[0], decimal=signs[1], units=("s", "rad/s"))
+        assert curve.xs == pytest.approx((0.0, 0.5), rel=1e-15)
+        assert curve.ys == pytest.approx((0.0, 2 * np.pi), rel=1e-15)
+        with pytest.warns(sw.NetworkWarning, match="is in (ms|rpm|U/min), and its numbers stand as they are"):
+            sw.Table.from_csv(path, x, y, delimiter=signs[0], decimal=signs[1])
+
+
+def test_numbers_that_are_scaled_or_in_si_are_taken_without_a_word(tmp_path: Path) -> None:
+    path = tmp_path / "bench.csv"
+    path.write_text("t [ms],tau [Nm],shaft_max\n0,1,2\n500,2,3\n", encoding="utf-8")
+    assert sw.Table.from_csv(path, "t", "tau", scale=(1e-3, 1)) == sw.Table([0, 0.5], [1, 2])
+    assert sw.Table.from_csv(path, "t", "shaft_max", scale=(1e-3, 2)) == sw.Table([0, 0.5], [4, 6])
+
+
+@pytest.mark.parametrize("gap", ["1,", "1,a", ",5", "1"])
+def test_a_gap_in_the_first_line_is_refused_by_numbers_too(tmp_path: Path, gap: str) -> None:
+    path = tmp_path / "bench.csv"
+    path.write_text(f"{gap}\n2,3\n3,4\n", encoding="utf-8")
+    with pytest.raises(sw.ParameterError, match=r"line 1: column . holds no number"):
+        sw.Table.from_csv(path)
 
 
 @pytest.mark.parametrize("gap", ["1,", "1,a", ",5"])

@@ -357,10 +357,13 @@ def test_what_cannot_be_measured_is_named_with_what_can(name: str, why: str) -> 
 GAIN = {"measured": "J2.omega", "D": 1.0}
 WRONG: list[tuple[dict[str, Any], str]] = [
     ({"D": [[1.0, 2.0]]}, r"D has the shape \(1, 2\) and must have \(1, 1\)"),
-    ({"A": [[1.0, 2.0]]}, r"A has the shape \(1, 2\)"),
+    ({"A": [[1.0, 2.0]], "B": 1.0, "C": 1.0}, r"A has the shape \(1, 2\)"),
     ({"A": [[1.0], [2.0, 3.0]]}, "no matrix of up to 64 by 64 finite numbers"),
     ({"D": float("nan")}, "no matrix"),
     ({"D": "[[1"}, "no matrix"),
+    ({"D": "a"}, "D is none: 'a' is no matrix"),
+    ({"D": None}, "A, B and C, or D must be given"),
+    ({"D": None, "A": -1.0, "B": 1.0}, "C must be given"),
     ({"D": [[1.0 + 2.0j]]}, "no matrix"),
     ({"D": True}, "no matrix"),
     ({"D": np.ones((1, 1, 1))}, "no matrix"),
@@ -385,7 +388,15 @@ def test_what_does_not_fit_together_is_refused_with_the_shape_that_would(values:
 
 @pytest.mark.parametrize(
     ("above", "below", "why"),
-    [([1, 0], [1], "of degree 0, below the numerator's 1"), ([1], [0, 0], "is zero"), ([1], [], "is zero")],
+    [
+        ([1, 0], [1], "of degree 0, below the numerator's 1"),
+        ([1], [0, 0], "denominator = .* not zeros alone"),
+        ([1], [], "denominator = .* not zeros alone"),
+        ([], [1], r"numerator = \[\] must be one row"),
+        ([[1, 2], [3, 4]], [1, 1, 1, 1, 1], "numerator = .* must be one row"),
+        ([1, 1], [1e-300, 1], "next to zero beside the others"),
+        ([float("nan")], [1], r"numerator is none: \[nan\]"),
+    ],
 )
 def test_a_transfer_function_without_states_for_it_is_refused(above: Any, below: Any, why: str) -> None:
     with pytest.raises(sw.ParameterError, match=why):

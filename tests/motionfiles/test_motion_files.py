@@ -179,6 +179,8 @@ def test_wrong_places_and_quantities_are_named(tmp_path: Path) -> None:
         sw.load_solution(tmp_path / "m.nc")
     with pytest.raises(sw.ParameterError, match="must be the name of a file"):
         sw.load_solution(3)  # type: ignore[arg-type]
+    with pytest.raises(sw.ParameterError, match=r"\[\] is no name"):
+        sol.save(tmp_path / "m.nc", [])  # type: ignore[arg-type]
     with pytest.raises(sw.SignalError, match=r"shaft\.tua"):
         sol.save(tmp_path / "m.nc", "shaft.tua")
     (tmp_path / "taken.nc").mkdir()

@@ -104,7 +104,7 @@ def test_steps_of_a_scene_are_one_run_and_come_back_to_the_last_bit(name: str) -
             assert error(value, wanted[signal], k) < 1e-9, (signal, k)
 
 
-@pytest.mark.parametrize("engine", ["auto", "scipy"])
+@pytest.mark.parametrize("engine", ["auto", "numba", "scipy"])
 @pytest.mark.parametrize(
     "name", [name if name == "gap" else pytest.param(name, marks=pytest.mark.slow) for name in NETWORKS]
 )
@@ -232,12 +232,34 @@ def test_looking_changes_no_bit() -> None:
     assert [runs[0][name] for name in runs[0].names] == [runs[1][name] for name in runs[1].names]
 
 
+@pytest.mark.parametrize("engine", ["numba", "scipy", pytest.param("sundials", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", ["gap", pytest.param("brake", marks=pytest.mark.slow)])
+def test_every_engine_comes_back_to_the_last_bit(name: str, engine: str) -> None:
+    names = ("J1.omega", "J2.omega", "shaft.tau")
+
+    def start() -> Simulation:
+        return NETWORKS[name](5.0).compile().start(inputs=["motor.tau"], engine=engine)
+
+    def on(run: Simulation) -> list[list[object]]:
+        run.set("motor.tau", 9.0)
+        return course(run, names, 20, 0.02)
+
+    run = start()
+    course(run, names, 20, 0.02)
+    state = pickle.loads(pickle.dumps(run.save_state()))  # noqa: S301
+    wanted, other = on(run), start()
+    for again in (run, run, other):
+        again.restore(state)
+        assert on(again) == wanted
+
+
 def test_modes_are_those_of_now() -> None:
     run = NETWORKS["friction"](0.0).compile().start(inputs=["motor.tau"])
     assert run.modes == {"load": "stuck"}
     run.set("motor.tau", 30.0)
     course(run, (), 10, 0.1)
     assert run.modes == {"load": "slipping forward"}
+    assert run.modes == NETWORKS["friction"](30.0).simulate(1.0).phases[-1].modes
 
 
 def test_a_stepped_motion_goes_on_from_another_one() -> None:
@@ -273,6 +295,7 @@ def test_a_hundred_hundredths_are_one() -> None:
         (lambda run: run.set("motor.tau", float("nan")), sw.ParameterError, "must be a finite number"),
         (lambda run: run.set("motor.tau", sin(T)), sw.ParameterError, "must be a number here"),
         (lambda run: run.set("J1.J", -1.0), sw.ParameterError, "must be"),
+        (lambda run: run.set("J1.J", 0.0), sw.CompileError, "inertia matrix of the parts 'J1' is singular"),
         (lambda run: run.step(0.0), sw.ParameterError, "dt = 0.0 must be above 0"),
         (lambda run: run.step(-1.0), sw.ParameterError, "above 0"),
         (lambda run: run.step(float("nan")), sw.ParameterError, "finite"),
@@ -310,6 +333,7 @@ def test_what_is_wrong_is_said_and_changes_nothing(
         ({"rtol": -1.0}, "rtol"),
         ({"t_start": "now"}, "t_start"),
         ({"initial": 3.0}, "must map"),
+        ({"t_eval": 3}, r"start\(\) has no option 't_eval'. It has: inputs, t_start"),
     ],
 )
 def test_wrong_options_are_refused_at_the_start(options: dict[str, object], words: str) -> None:

@@ -335,3 +335,14 @@ def test_a_shaft_without_bearing_friction_warns_of_none_however_thin_it_is() -> 
     net.add(sw.Shaft("wire", length=1.0, diameter=1e-3, model=sw.Wave()), "a", "b")
     net.add(sw.Inertia("J2", J=1e-9), "b")
     assert net.simulate(1e-3).energy_residual < 1e-9
+
+
+def test_modes_of_a_line_of_a_circuit_are_refused_with_what_to_take() -> None:
+    net = sw.Network("line")
+    net.add(sw.VoltageSource("source", u=1.0), "in", "g")
+    net.add(sw.Resistor("R", R=50.0), "in", "a")
+    net.add(sw.TransmissionLine("line", Z_0=50.0, delay=1e-3), "a", "b")
+    net.add(sw.Capacitor("end", C=1e-6), "b", "g")
+    net.add(sw.Ground("frame"), "g")
+    with pytest.raises(sw.SimulationError, match=r"TransmissionLine 'line' has a delay .* Take n inductors"):
+        net.modes()

@@ -72,7 +72,8 @@ class Gains:
         Raises:
             ParameterError: it is none.
         """
-        return cls(_literal(value) if isinstance(value, str) else value)
+        literal = _literal(value) if isinstance(value, str) else None
+        return cls(value if literal is None else literal)
 
     @property
     def array(self) -> Any:
@@ -174,7 +175,8 @@ class Controller(Component):
         n, k, m = len(A), len(self.measured.names), len(self.acts.names)
         for name, matrix, shape in (("A", A, (n, n)), ("B", B, (n, k)), ("C", C, (m, n)), ("D", D, (m, k))):
             if matrix.shape != shape:
-                hint = " Name what each output is: acts=['torque', 'torque']." if name in "CD" and m == 1 else ""
+                more = name in "CD" and len(matrix) > m
+                hint = " Name what each output is: acts=['torque', 'torque']." if more else ""
                 raise ParameterError(
                     f"{title}: {name} has the shape {matrix.shape} and must have {shape}, as A has {n} rows and "
                     f"{k} measured quantities lead to {m} outputs ({', '.join(self.acts.names)}).{hint}"
@@ -272,6 +274,12 @@ class StateSpaceController(Controller):
         """As given; without A there are no states, without D there is no direct way through."""
         k, m = len(self.measured.names), len(self.acts.names)
         n = 0 if self.A is None else len(self.A.rows)
+        needed = {"A, B and C, or D": self.D} if not n else {"B": self.B, "C": self.C}
+        if missing := [names for names, gains in needed.items() if gains is None]:
+            raise ParameterError(
+                f"StateSpaceController '{self.name}': {missing[0]} must be given, else it does nothing. A gain alone "
+                "is D = [[2.0]]; a PI controller has A = 0, B = 1, C = k_i, D = k_p."
+            )
         sized = ((self.A, (n, n)), (self.B, (n, k)), (self.C, (m, n)), (self.D, (m, k)))
         A, B, C, D = (
             np.zeros(shape) if gains is None or not (gains.rows or 0 not in shape) else gains.array
@@ -324,14 +332,29 @@ class TransferFunctionController(Controller):
 
     def matrices(self) -> tuple[Any, Any, Any, Any]:
         """The controllable canonical form."""
+        title = f"TransferFunctionController '{self.name}'"
+        for name in ("numerator", "denominator"):
+            gains = getattr(self, name)
+            if len(gains.rows) != 1 or (name == "denominator" and not gains.array.any()):
+                raise ParameterError(
+                    f"{title}: {name} = {gains} must be one row of coefficients from the highest power down, such as "
+                    "[2.0, 1.0], of a denominator not zeros alone."
+                )
+        if len(self.measured.names) > 1 or len(self.acts.names) > 1:
+            raise ParameterError(f"{title}: it leads from one measured quantity to one output. Take several of them.")
         above, below = (np.trim_zeros(gains.array.ravel(), "f") for gains in (self.numerator, self.denominator))
         n = below.size - 1
-        if not below.size or above.size > below.size:
-            what = "is zero" if not below.size else f"is of degree {n}, below the numerator's {above.size - 1}"
+        if above.size > below.size:
             raise ParameterError(
-                f"TransferFunctionController '{self.name}': its denominator {what}, and no states give such an output. "
-                "Add a fast pole: k_d s is k_d s / (T s + 1)."
+                f"{title}: its denominator is of degree {n}, below the numerator's {above.size - 1}, and no states "
+                "give such an output. Add a fast pole: k_d s is k_d s / (T s + 1)."
             )
-        a, b = below / below[0], np.concatenate([np.zeros(n + 1 - above.size), above]) / below[0]
+        with np.errstate(over="ignore"):
+            above, below = above / below[0], below / below[0]
+        if not np.abs([*above, *below]).max() <= LARGEST:
+            raise ParameterError(
+                f"{title}: the first coefficient of its denominator is next to zero beside the others. Leave it out."
+            )
+        a, b = below, np.concatenate([np.zeros(n + 1 - above.size), above])
         A = np.vstack([-a[None, 1:], np.eye(n)[:-1]]) if n else np.zeros((0, 0))
         return A, np.eye(n)[:, :1].reshape(n, 1), (b[1:] - b[0] * a[1:]).reshape(1, n), np.array([[b[0]]])

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
+import io
 import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
@@ -13,13 +15,18 @@ from pathlib import Path
 
 import numpy as np
 
-from shaftwork.core.errors import ParameterError, imported
+from shaftwork.core.errors import NetworkWarning, ParameterError, imported
+from shaftwork.core.notices import warn
 from shaftwork.core.parameters import UNIT, converted
 
-_HEAD = re.compile(r"(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))")
-"""A name and its unit: "omega [rpm]" or "omega (rpm)"."""
+_HEAD = re.compile(
+    r"(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\)|_(?P<tail>[mnuµμ]s|rpm|deg|k?Nm|k[NW]|m[mAV]))"
+)
+"""A name and its unit: "omega [rpm]", "omega (rpm)" or "omega_rpm"."""
 _TOGETHER = re.compile(r"\b([kM]?N)m\b")
-_SPELLINGS = {"%": "percent", "°C": "degC", "°": "degree"}
+_SPELLINGS = {"%": "percent", "°C": "degC", "°": "degree", "°/s": "degree/s"} | dict.fromkeys(("U/min", "r/min"), "rpm")
+_NOT_SI = re.compile(r"[mnuµμkM](?:s|A|V|W|N|J|m|bar|N[ *·]?m)|min|h|rpm|[1Ur]/min|deg(?:ree)?|°|deg/s|°/s|km/h|bar|%")
+"""Units in which numbers are another quantity than in SI."""
 Value = float | datetime
 
 
@@ -33,13 +40,15 @@ class Columns:
         delimiter: between columns.
         decimal: sign.
         units: to which the columns are converted from the units in their heads; None for those to take as they are.
+        scale: by which they are multiplied.
     """
 
     path: Path
     columns: tuple[str | int, str | int]
     delimiter: str
     decimal: str
-    units: tuple[str | None, str | None] = (None, None)
+    units: tuple[str | None, str | None]
+    scale: tuple[float, float]
 
     def read(self) -> list[list[float]]:
         """The arguments and the values.
@@ -49,16 +58,16 @@ class Columns:
             MissingExtraError: a unit is to be converted, and pint is not installed.
         """
         try:
-            with self.path.open(encoding="utf-8-sig", newline="") as file:
-                rows = [(line, [cell.strip() for cell in row]) for line, row in _rows(file, self.delimiter)]
+            lines = io.StringIO(_text(self.path.read_bytes()), newline="")
+            rows = [(line, [cell.strip() for cell in row]) for line, row in _rows(lines, self.delimiter)]
         except (OSError, ValueError, csv.Error) as error:
             raise ParameterError(f"The table '{self.path}' cannot be read: {error}.") from None
         places, head, first = self._places(rows)
-        lines = [(line, self._values(line, row, places)) for line, row in rows[first:]]
-        self._check_order([(line, x) for line, (x, _) in lines])
-        stamped = isinstance(lines[0][1][0], datetime)
+        points = [(line, self._values(line, row, places)) for line, row in rows[first:]]
+        self._check_order([(line, x) for line, (x, _) in points])
+        stamped = isinstance(points[0][1][0], datetime)
         units = ["s" if stamped else self._unit(0, places, head), self._unit(1, places, head)]
-        xs, ys = zip(*(values for _, values in lines), strict=True)
+        xs, ys = zip(*(values for _, values in points), strict=True)
         seconds = [(x - xs[0]).total_seconds() if isinstance(x, datetime) else x for x in xs]
         return [self._converted(number, values, units[number]) for number, values in enumerate((seconds, ys))]
 
@@ -68,15 +77,17 @@ class Columns:
         Raises:
             ParameterError: there is no such row, or it has a gap.
         """
-        start, places = 0, _places_in([], self.columns)
+        start, places, gaps = 0, _places_in([], self.columns), list[tuple[int, list[str]]]()
         for count, (number, row) in enumerate(rows):
             if places is not None and None not in self._cells(row, places):
+                for gap in gaps[:1]:
+                    self._values(*gap, places)  # refuses it
                 return places, [head for _, head in rows[start:count]], count
-            if any(isinstance(column, str) for column in self.columns):
-                named = _places_in(row, self.columns)
-                if named is None and places is not None and self._cells(row, places) != [None, None]:
-                    self._values(number, row, places)  # refuses a gap in the first line below the head
-                start, places = (start, places) if named is None else (count, named)
+            named = _places_in(row, self.columns) if any(isinstance(column, str) for column in self.columns) else None
+            if named is not None:
+                start, places, gaps = count, named, []
+            elif places is not None and self._is_gap(row, places):
+                gaps.append((number, row))
         line = f" Its first line is: {', '.join(rows[0][1])}." if rows else " It is empty."
         raise ParameterError(
             f"'{self.path}' has no line with numbers in the columns {', '.join(map(repr, self.columns))}.{line} Name "
@@ -89,6 +100,13 @@ class Columns:
         texts = [row[place] if 0 <= place < len(row) else "" for place in places]
         x, y = (_number(text, self.decimal) for text in texts)
         return [_stamp(texts[0]) if x is None else x, y]
+
+    def _is_gap(self, row: Sequence[str], places: tuple[int, int]) -> bool:
+        """Whether a row holds one number alone: not so a setting above the head of numbered columns, "rate,1000"."""
+        x, y = self._cells(row, places)
+        numbered = all(isinstance(column, int) for column in self.columns)
+        setting = numbered and x is None and any(row[places[0] : places[0] + 1])
+        return (x is None) != (y is None) and not setting
 
     def _values(self, line: int, row: Sequence[str], places: tuple[int, int]) -> list[Value]:
         values = []
@@ -118,18 +136,24 @@ class Columns:
                 )
 
     def _unit(self, number: int, places: tuple[int, int], head: Sequence[Sequence[str]]) -> str:
-        """The unit in the head of a column: in brackets behind its name, or else in the last line above the numbers."""
+        """The unit in the head of a column: behind its name, or else in the last line above the numbers."""
         cells = [row[places[number]] for row in head if places[number] < len(row)]
-        for cell in cells:
+        for cell in reversed(cells):
             if match := _HEAD.fullmatch(cell):
-                return match["square"] or match["round"] or ""
+                return match["square"] or match["round"] or match["tail"] or ""
         return cells[-1] if len(cells) > 1 else ""
 
     def _converted(self, number: int, values: Sequence[float], unit: str) -> list[float]:
         """The values of a column in the unit that is wanted."""
-        wanted, column = self.units[number], self.columns[number]
+        wanted, column, factor = self.units[number], self.columns[number], self.scale[number]
+        if wanted is None and factor == 1.0 and _NOT_SI.fullmatch(unit):
+            warn(
+                f"'{self.path}', column {column!r} is in {unit}, and its numbers stand as they are. Give units or "
+                f"scale to have them in SI, or units with {unit!r} where it is meant so.",
+                NetworkWarning,
+            )
         if wanted is None or unit == wanted:
-            return list(values)
+            return [factor * value for value in values]
         written = _TOGETHER.sub(r"\1*m", _SPELLINGS.get(unit, unit)).replace("·", "*")
         where = f"'{self.path}', column {column!r}"
         if not written or len(written) > 50 or not UNIT.fullmatch(written.removeprefix("1")):
@@ -146,7 +170,17 @@ class Columns:
         numbers, objection = converted(quantity, wanted)
         if objection is not None:
             raise ParameterError(f"{where} {objection}. Give scale instead of units to say what it means.")
-        return [float(value) for value in numbers]
+        return [factor * float(value) for value in numbers]
+
+
+def _text(content: bytes) -> str:
+    """The text of a file: UTF-8, UTF-16 with its mark, or else as Windows writes it in the west."""
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return content.decode("utf-16")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("cp1252")
 
 
 def _rows(lines: Iterable[str], delimiter: str) -> Iterator[tuple[int, list[str]]]:

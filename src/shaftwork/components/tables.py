@@ -79,9 +79,10 @@ class Table(sympy.Atom):  # type: ignore[misc]
         """The curve through two columns of a file, as measuring equipment writes it.
 
         Lines that are empty or begin with "#" are left out, and so are those before the first that has numbers in both
-        columns: of these the last that has the names is the head, with units as "omega [rpm]", "omega (rpm)", or in a
-        line below it. Arguments may be time stamps, "2026-03-01T12:00:00.5", to the microsecond: they become seconds
-        from the first.
+        columns: of these the last that has the names is the head, with units as "omega [rpm]", "omega (rpm)",
+        "omega_rpm", or in a line below it. Without `units` and `scale` numbers are taken as they stand, for SI, and a
+        `NetworkWarning` says where the head has another unit, such as ms. Arguments may be time stamps,
+        "2026-03-01T12:00:00.5", to the microsecond: they become seconds from the first.
 
         Args:
             path: of the file.
@@ -101,11 +102,10 @@ class Table(sympy.Atom):  # type: ignore[misc]
             raise ParameterError(
                 f"Table.from_csv: delimiter = {delimiter!r} must be one sign, other than that of decimals, {decimal!r}."
             )
-        wanted = _two_units(units)
-        points = Columns(Path(path), (x, y), delimiter, decimal, wanted).read()
-        factors = [in_si(f"Table.from_csv: scale[{place}]", factor) for place, factor in enumerate(scale)]
+        first, second = (in_si(f"Table.from_csv: scale[{place}]", factor) for place, factor in enumerate(scale))
+        points = Columns(Path(path), (x, y), delimiter, decimal, _two_units(units), (first, second)).read()
         try:
-            return cls(*([factor * value for value in column] for factor, column in zip(factors, points, strict=True)))
+            return cls(*points)
         except ParameterError as error:
             raise ParameterError(f"'{path}': {error}") from None
 

@@ -40,12 +40,18 @@ def refuse_waves(form: StateForm) -> None:
     Raises:
         SimulationError: a line has a delay that no matrix holds.
     """
-    if form.waves:
+    if not form.waves:
+        return
+    line = form.graph.part_of(form.waves[0])
+    if not hasattr(line.component, "model"):  # of a circuit, no shaft
         raise SimulationError(
-            f"Shaft '{form.graph.part_of(form.waves[0]).name}' is a travelling wave, whose delay no matrix holds. Its "
-            "modes and its frequency response are those of net.modes() and net.frequency_response(); for matrices take "
-            "model=Spectral(16)."
+            f"{type(line.component).__name__} '{line.name}' has a delay that no matrix holds, and exact modes are "
+            "those of shafts. Take n inductors of Z_0 delay / n with capacitors of delay / (Z_0 n), or simulate it."
         )
+    raise SimulationError(
+        f"Shaft '{line.name}' is a travelling wave, whose delay no matrix holds. Its modes and its frequency response "
+        "are those of net.modes() and net.frequency_response(); for matrices take model=Spectral(16)."
+    )
 
 
 class Linearization:

@@ -218,6 +218,7 @@ class HybridState(NamedTuple):
         now = np.abs(regime.guards_at(span[0], self.x.tolist()))
         return changed(
             whole,
+            rhs=equations.right_side(regime.p),
             x0=np.concatenate([self.x, np.zeros(sizes.size)]),
             t0=span[0],
             t_end=span[1],

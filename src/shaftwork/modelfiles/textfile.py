@@ -345,5 +345,8 @@ def _checked(key: str, value: Any) -> Value:
 def _shown(value: Any) -> str:
     """A value as the file writes it, shortened."""
     words = {True: "true", False: "false"}
-    shown = words[value] if isinstance(value, bool) else repr(value)
+    try:
+        shown = words[value] if isinstance(value, bool) else repr(value)
+    except ValueError:  # Python writes no integer of more than 4300 digits, which TOML has in hexadecimal
+        shown = "an endless integer"
     return shown if len(shown) <= 60 else f"{shown[:57]}..."

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import reprlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +22,9 @@ from shaftwork.pipeline.compiler import Compiler
 from shaftwork.pipeline.motion_start import Ending, Repetition
 from shaftwork.results.observer import Array, PhaseRow
 from shaftwork.results.solution import Solution
+
+KINDS = dict.fromkeys(("name", "engine", "why", "caveat"), str) | dict.fromkeys(("statistics", "parameters"), dict)
+"""Of facts in a file the kinds."""
 
 
 @dataclass(frozen=True)
@@ -94,9 +98,10 @@ def solution_of(text: str, t: Array, columns: Mapping[str, Array], trust: Any) -
                 f"its format is {version!r}, and this version reads {FORMAT}. Update the package if the file is newer."
             )
         state: dict[str, Any] = {name: said[name] for name in PLAIN}
-        state["states"] = tuple(said["states"])
-        state["events"] = tuple(map(tuple, said["events"]))
-        state["phases"] = tuple(PhaseRow(start, end, dict(modes)) for start, end, modes in said["phases"])
+        _refuse_other_kinds(said)
+        state["states"] = tuple(map(str, said["states"]))
+        state["events"] = tuple((float(time), str(part), str(a), str(b)) for time, part, a, b in said["events"])
+        state["phases"] = tuple(PhaseRow(float(a), float(b), _words(modes)) for a, b, modes in said["phases"])
         stored = [columns[name] for name in (*said["states"], *(name for name in columns if name.startswith(ARRIVING)))]
         x = np.column_stack(stored) if stored else np.zeros((len(t), 0))
         call = _call_of(said["call"], said["name"], t, trusted)
@@ -108,6 +113,15 @@ def solution_of(text: str, t: Array, columns: Mapping[str, Array], trust: Any) -
     motion = Solution.__new__(Solution)
     motion.__setstate__({**state, "t": t, "x": x, "again": call, "saved": others})
     return motion
+
+
+def _refuse_other_kinds(said: Mapping[str, Any]) -> None:
+    if wrong := [name for name, kind in KINDS.items() if not isinstance(said[name], kind)]:
+        raise TypeError(f"{wrong[0]} = {reprlib.repr(said[wrong[0]])}")
+
+
+def _words(modes: Mapping[str, str]) -> dict[str, str]:
+    return {part: str(mode) for part, mode in modes.items()}
 
 
 def _call_of(said: Mapping[str, Any], name: str, t: Array, trusted: Sequence[str]) -> Repetition | NotRepeatable:
@@ -128,5 +142,5 @@ def _call_of(said: Mapping[str, Any], name: str, t: Array, trusted: Sequence[str
         said["max_steps"],
         None,
     )
-    rebuild = Compiler(tuple(said["angles"]), said["accepted"])
+    rebuild = Compiler(tuple(map(str, said["angles"])), str(said["accepted"]))
     return Repetition(rebuild, netlist, demand, said["engine"], said["values"], initial)

@@ -11,6 +11,7 @@ import numpy as np
 from shaftwork.core.errors import ModelFileError, ParameterError, imported
 from shaftwork.core.files import drafted, in_a_folder
 from shaftwork.motionfiles.record import ARRIVING, record_text
+from shaftwork.pipeline.arguments import as_names
 from shaftwork.results.data_frames import to_pandas, to_xarray
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
@@ -29,7 +30,7 @@ def write_motion(call: Repetition, motion: Solution, path: Any, names: Sequence[
     """Write a motion; see `Solution.save`."""
     place = in_a_folder(path)
     writer, _ = _format_of(place)
-    wanted = dict.fromkeys((*motion.states, *(names or (*motion.names, *motion.places))))
+    wanted = dict.fromkeys((*motion.states, *(as_names(names) or (*motion.names, *motion.places))))
     text = record_text(motion, call)
     try:
         with drafted(place) as draft:

@@ -12,7 +12,7 @@ from shaftwork.codegen.array_form.elements import Array
 from shaftwork.hybrid.hybrid_run import HybridRun, tightened_for
 from shaftwork.hybrid.hybrid_state import HybridState
 from shaftwork.pipeline.arguments import Demand, Given
-from shaftwork.stepper.moments import Moment, MomentState, Observations, smooth_steps
+from shaftwork.stepper.moments import Moment, MomentState, Observations, smooth_engine, smooth_steps
 
 if TYPE_CHECKING:
     from shaftwork.hybrid.hybrid_model import HybridModel
@@ -46,7 +46,9 @@ def hybrid_moment(
         return equations.bound(p)
 
     pairs = tuple(zip(regime.machines, regime.modes, strict=True))
-    problem = tightened_for(run.problem(t, state), "heyoka")
+    problem = run.problem(t, state)
+    if engine := smooth_engine(demand.engine):
+        problem = tightened_for(problem, engine)
     return Moment(
         model=regime.model,
         readings=cached[equations.readings],
@@ -60,5 +62,6 @@ def hybrid_moment(
         parameters={**model.parameters, **values},
         modes={machine.name: name for machine, name in pairs},
         words={machine.name: machine.modes[name].words for machine, name in pairs},
+        problem=lambda p: equations.problem(regime.modes, p),
         steps=smooth_steps(regime.model, problem, demand, place),
     )

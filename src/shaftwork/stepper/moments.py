@@ -31,8 +31,8 @@ from shaftwork.results.observer import Reader
 if TYPE_CHECKING:
     from shaftwork.pipeline.model import Model
 
-SMOOTH = ("auto", "heyoka")
-"""Engines with which a step in which nothing happens is a series or two."""
+SMOOTH = ("heyoka", "numba")
+"""Engines with which a step in which nothing happens is a series or two, or a few steps in machine code."""
 BESIDE = 1e-9
 """Seconds after an instant at which a quantity is read that has no value in it, as 0/0."""
 
@@ -127,6 +127,7 @@ class Moment:
         bind: makes the equations with a parameter vector.
         stored: from the equations, a time in s and the states to all that is stored.
         parameters: of the network, by name.
+        problem: from parameters (p,) to the motion with them.
         modes: by element that changes its mode.
         words: the same in the words of phases.
         steps: by which it goes on while nothing happens, or None where there are none.
@@ -142,6 +143,7 @@ class Moment:
     bind: Callable[[Array], BoundArrays]
     stored: Callable[[Callable[[], BoundArrays], float, Array], Mapping[str, float]]
     parameters: Mapping[str, float]
+    problem: Callable[[Array], Problem]
     modes: Mapping[str, str] = field(default_factory=dict)
     words: Mapping[str, str] = field(default_factory=dict)
     steps: Any = None
@@ -165,7 +167,7 @@ class Moment:
             return False
         vector = self.vector.copy()
         vector[place] = value
-        if not self.steps.with_parameters(vector):
+        if not self.steps.with_parameters(vector, lambda: self.problem(vector[: len(self.model.parameters)])):
             return False
         self.vector, self.parameters, self._lists = vector, {**self.parameters, name: value}, None
         return True
@@ -263,6 +265,7 @@ def plain_moment(
         stored=StateTransfer(form).at_once,
         parameters={**model.parameters, **values},
         steps=smooth_steps(model, prepared.problem(x, demand), demand, place),
+        problem=lambda p: model.prepare(p).problem(x, demand),
     )
 
 
@@ -276,10 +279,19 @@ def smooth_steps(model: CompiledModel, problem: Problem, demand: Demand, place: 
         place: to which the motion comes back, or None.
     """
     form = model.form
-    if demand.engine not in SMOOTH or not available("heyoka"):
+    engine, at = smooth_engine(demand.engine), None if place is None else place.snapshot
+    if not engine or form.waves or form.loop_laws or form.doubtful or form.samples or not problem.x0.size:
         return None
-    if form.waves or form.loop_laws or form.doubtful or form.samples:
-        return None
-    from shaftwork.integrate.taylor.smooth_steps import SmoothSteps
+    if engine == "heyoka":
+        from shaftwork.integrate.taylor.smooth_steps import SmoothSteps
 
-    return SmoothSteps(problem, None if place is None else place.snapshot) if SmoothSteps.suit(problem) else None
+        return SmoothSteps(problem, at) if SmoothSteps.suit(problem) else None
+    from shaftwork.integrate.explicit.dormand_prince import MachineSteps
+
+    exact = demand.engine == "auto" and problem.linear is not None
+    return None if exact or problem.machine is None else MachineSteps(problem, at)
+
+
+def smooth_engine(engine: str) -> str:
+    """The engine of steps in which nothing happens, by the one that is asked for; empty where there is none."""
+    return next((name for name in SMOOTH if engine in ("auto", name) and available(name)), "")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,12 +12,11 @@ import numpy as np
 from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError
 from shaftwork.core.parameters import in_si
 from shaftwork.integrate.choice import check
-from shaftwork.integrate.engines import available
 from shaftwork.pipeline.arguments import Demand, Given, Names, relative_tolerance
 from shaftwork.pipeline.motion_start import ending_of, handed_over, time_of_start
 from shaftwork.results.solution import Solution
 from shaftwork.stepper.input_values import Settings
-from shaftwork.stepper.moments import SMOOTH, Moment, MomentState, Observations, plain_moment
+from shaftwork.stepper.moments import Moment, MomentState, Observations, plain_moment, smooth_engine
 
 if TYPE_CHECKING:
     from shaftwork.pipeline.model import Model
@@ -88,13 +88,19 @@ class Simulation:
         rtol: float = 1e-8,
         atol: float | Sequence[float] | None = None,
         engine: str = "auto",
+        **others: Any,
     ) -> None:
+        if others:
+            raise ParameterError(
+                f"start() has no option {next(iter(others))!r}. It has: inputs, t_start, initial, parameters, rtol, "
+                "atol, engine. What a step leads to is read after it, run['J2.omega']."
+            )
         if not model.form.waves:
             check(engine)
         if parameters is not None and not isinstance(parameters, Mapping):
             raise ParameterError(f"parameters = {parameters!r} must map names to values, such as {{'shaft.c': 3e4}}.")
         self._options = Demand((0.0, 1.0), relative_tolerance(rtol), atol, None, engine, MOST_STEPS, None)
-        self._is_smooth = engine in SMOOTH and available("heyoka")
+        self._is_smooth = bool(smooth_engine(engine))
         self._settings = Settings(model, parameters, inputs)
         self._cached: dict[Any, Observations] = {}
         started: Any = ending_of(initial, model.form.graph) if isinstance(initial, Solution) else initial
@@ -153,14 +159,23 @@ class Simulation:
 
         Raises:
             ParameterError: there is none of this name, or the value is not admissible.
+            CompileError: the network has no motion with it.
             SimulationError: the motion has failed before.
         """
         self._refuse_failed()
-        moment, settings = self._moment, self._settings
+        moment, settings, before = self._moment, copy(self._settings), dict(vars(self))
         same = settings.set(name, value)
+        self._settings = settings
         # one that is only looked at is left, so that looking changes no bit of what follows
-        if not (self._moved and same and moment is not None and moment.set(name, settings.values[name])):
+        if self._moved and same and moment is not None and moment.set(name, settings.values[name]):
+            return
+        try:
             self._leave(moment)
+            if not same or not all(name in readings.in_laws for readings in self._cached.values()):
+                _ = self._now
+        except ShaftworkError:
+            vars(self).update(before)
+            raise
 
     def step(self, dt: float) -> None:
         """Go on by a time.
@@ -192,8 +207,7 @@ class Simulation:
     def save_state(self) -> SavedState:
         """All that the motion goes on with from here, to come back with `restore`; it pickles.
 
-        What follows is the same to the last bit, with heyoka and where no part changes its mode. With other engines a
-        motion through phases is the same to rounding, as equations that are used often get faster code.
+        What follows is the same to the last bit, with each engine.
         """
         place = self._moment.place if self._moved and self._moment is not None else None
         values = dict(self._settings.values)

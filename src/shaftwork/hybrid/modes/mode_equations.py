@@ -86,7 +86,7 @@ class ModeEquations:
             _ = self._shown.function  # so that all quantities are known before any function of them is made
         self._prepared = BoundedCache[bytes, Prepared](KEPT)
         self._matrices = BoundedCache[LinearPart, ReadingMatrices](KEPT)
-        self._rates_by_p = BoundedCache[bytes, tuple[RightSide, dict[str, Any]]](KEPT)
+        self._notes_by_p = BoundedCache[bytes, dict[str, Any]](KEPT)
         self._guards_by_p = BoundedCache[bytes, GuardValues](KEPT)
         self._translated = BoundedCache[tuple[int, Expr], Expr](KEPT)
         self._numbers = [self._places[machine.number] for machine in machines if machine.number in self._places]
@@ -209,7 +209,7 @@ class ModeEquations:
 
     def problem(self, modes: ModeNames, p: Array) -> Problem:
         """What is the same in all phases of these modes; the rest is empty."""
-        bound, (_, notes), clocks, size = partial(self.bound, p), self._rates(p), self.clocks, len(self.model.states)
+        bound, clocks, size = partial(self.bound, p), self.clocks, len(self.model.states)
         guards, none = self.guards(p), np.empty(0)
         values = guards if not clocks else lambda t, y: guards(t, y[:, :size])
         return Problem(
@@ -226,7 +226,7 @@ class ModeEquations:
             compiled=cache(lambda: self._machine(p)),
             explain=lambda t, y: self.without_value(p, modes, t, y[:, :size]),
             rough=lambda t, y: self._rough(p, modes, t, y[:, :size]),
-            estimates=notes,
+            estimates=self._notes(p),
             rates=None if self.model.form.loop_laws else partial(self._many_rates, p),
         )
 
@@ -252,8 +252,8 @@ class ModeEquations:
         return problem
 
     def right_side(self, p: Array) -> RightSide:
-        """The rates of the states and, behind them, of the clocks."""
-        (rates, _), guards, clocks, size = self._rates(p), self.guards(p), list(self.clocks), len(self.model.states)
+        """The rates of the states and, behind them, of the clocks; in a run, whatever was before."""
+        rates, guards, clocks, size = self._right_side(p), self.guards(p), list(self.clocks), len(self.model.states)
         if not clocks:
             return rates
 
@@ -283,21 +283,21 @@ class ModeEquations:
                     return float(time), in_words(self.machines[active.machine].part, active.leave.when)
         return law
 
-    def _rates(self, p: Array) -> tuple[RightSide, dict[str, Any]]:
-        """The right-hand side and what engines find out about it, for all phases with these parameters."""
-        return self._rates_by_p(p.tobytes(), lambda: (self._right_side(p), {}))
+    def _notes(self, p: Array) -> dict[str, Any]:
+        """What engines find out about the right-hand side, for all phases with these parameters."""
+        return self._notes_by_p(p.tobytes(), dict)
 
     def _right_side(self, p: Array, few_calls: int = 50) -> RightSide:
         """In scalar code where there is some: that of `motion`, as a few calls are not worth code of their own."""
         scalar = self.whole.scalar
         if scalar is None:
             return self.bound(p).rhs
-        motion, calls, values = self.motion(p)[0], count(), self.values(p)
-        scalar_rates = cache(lambda: scalar.bind(values))
+        calls, motion = count(), cache(lambda: self.motion(p)[0])
+        scalar_rates = cache(lambda: scalar.bind(self.values(p)))
 
         def rates(t: float, x: Array) -> Array:
             if next(calls) < few_calls:
-                return np.array(motion(t, x.tolist())[0])
+                return np.array(motion()(t, x.tolist())[0])
             return scalar_rates()(t, x)
 
         return rates

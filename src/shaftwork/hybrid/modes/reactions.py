@@ -26,7 +26,7 @@ from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.calls import BoundedCache
 from shaftwork.formulation.form import StateForm
 from shaftwork.hybrid.modes.joints import HeldArrays, HeldRows, HeldStores, Joints, groups, held_places
-from shaftwork.hybrid.modes.mode_equations import ModeEquations, RightSide
+from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import ModeMachine, ModeNames, is_same
 from shaftwork.integrate.problem import Problem
 from shaftwork.network.graph import GROUND
@@ -56,7 +56,6 @@ class ReactionEquations(ModeEquations):
         joining = (machine.number for machine, law in zip(machines, laws, strict=True) if law is not None)
         self._joining = [self._places[number] for number in joining if number in self._places]
         self._joints: tuple[LinearPart, Joints] | None = None
-        self._notes: dict[bytes, dict[str, Any]] = {}
         self._entries_of: tuple[Joints, Array] | None = None
         _ = self._many, self.clocks  # made once for all
 
@@ -64,9 +63,8 @@ class ReactionEquations(ModeEquations):
         """The equations in which the machines of these numbers hold."""
         other = copy(self)
         # of each combination of what holds, few: there may be many of these
-        caches: dict[str, Any] = {name: BoundedCache(2) for name in ("_guards_by_p", "_rates_by_p")}
         laws = [law for k in numbers if (law := self._laws[k]) is not None]
-        vars(other).update(_holding_laws=laws, _joints=None, _entries_of=None, **caches)
+        vars(other).update(_holding_laws=laws, _joints=None, _entries_of=None, _guards_by_p=BoundedCache(2))
         return other
 
     def holds_by_numbers(self, number: int) -> bool:
@@ -128,12 +126,11 @@ class ReactionEquations(ModeEquations):
         plain = self.prepared(p).bound
         return HeldArrays(plain.program, p, plain.part, self.joints(p))
 
-    def _rates(self, p: Array) -> tuple[RightSide, dict[str, Any]]:
-        """The right-hand side and what engines find out about it, whatever holds."""
+    def _notes(self, p: Array) -> dict[str, Any]:
+        """What engines find out about the right-hand side, whatever holds."""
         free = p.copy()
         free[self._joining] = 0.0
-        notes = self._notes.setdefault(free.tobytes(), {})
-        return self._rates_by_p(p.tobytes(), lambda: (self._right_side(p), notes))
+        return super()._notes(free)
 
 
 def laws_that_hold(model: Model, machines: Sequence[ModeMachine]) -> list[int | None] | None:

@@ -6,24 +6,28 @@ that meets one are thrown away. Between the ends of its steps it makes them agai
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from shaftwork.core.errors import ParameterError
+from shaftwork.core.errors import ParameterError, SimulationError
 from shaftwork.integrate.crossings import FIRST, vertices
 from shaftwork.integrate.explicit.dormand_prince_loops import advance, between, watch
 from shaftwork.integrate.explicit.explicit_runs import MarchedRun, solid
 from shaftwork.integrate.problem import Array, MachineRates, Problem, Trajectory, changed
-from shaftwork.integrate.smooth_intervals import GuardedFunctions, SmoothInterval, failure
+from shaftwork.integrate.smooth_intervals import GuardedFunctions, SmoothInterval, failure, pieces
 from shaftwork.integrate.stepping import Step, march, with_outputs
+from shaftwork.integrate.stiffness import bound_of_decay, jacobians
 from shaftwork.numerics.zeros import LOOKS
 
 # Where in a step that is not far from a switch the others look.
 LATER = np.sort(np.append(FIRST, LOOKS))
 # Steps in one call: the most, where nothing can be met in them; and at first, doubled while they meet nothing.
 MOST_AHEAD, FIRST_AHEAD = 4096, 8
+MOST_SMOOTH = 256
+"""Steps in one from outside: where more are needed the motion is stiff."""
 
 
 def solve(problem: Problem) -> Trajectory:
@@ -105,6 +109,72 @@ class _MachineDense:
         return states
 
 
+class MachineSnapshot(NamedTuple):
+    """All that tells how smooth steps go on.
+
+    Args:
+        t: time, s.
+        x: (n,) state.
+        piece: in which they go on.
+        length: of the next step, s.
+        longest: a step at most, s: far from the edge of stability, so that strong dampers have right torques.
+        offsets: of the guards, if there are any.
+    """
+
+    t: float
+    x: Array
+    piece: SmoothInterval
+    length: float
+    longest: float
+    offsets: Array | None
+
+
+class MachineSteps:
+    """Steps from a state on while nothing happens; where one fails, nothing has changed.
+
+    Args:
+        problem: the motion up to its next breakpoint.
+        at: goes on from there, in equal equations; by default from the start of the problem.
+    """
+
+    def __init__(self, problem: Problem, at: MachineSnapshot | None = None) -> None:
+        guards = problem.guards
+        if at is None:
+            bound = bound_of_decay(jacobians(problem))
+            offsets = None if guards is None else guards.offsets
+            longest = 1 / bound if bound > 0 else np.inf
+            at = MachineSnapshot(problem.t0, problem.x0, pieces(problem)[0], 0.0, longest, offsets)
+        elif guards is not None:
+            problem = changed(problem, guards=replace(guards, offsets=np.asarray(at.offsets)))
+        self._problem, self.at = problem, at
+
+    def step(self, end: float) -> bool:
+        """Go on to a time in s; False where something happens on the way, and nothing has been done."""
+        at, machine = self.at, self._problem.machine
+        if machine is None or end >= at.piece.end or end - at.t > MOST_SMOOTH * at.longest:
+            return False
+        stepper = _MachineStepper(self._problem, machine, at.longest)
+        stepper.resume(at, end)
+        try:
+            step = stepper.step(at.t, at.x)
+        except SimulationError:
+            return False
+        if not step.clear or step.end < end:
+            return False
+        self.at = at._replace(t=end, x=step.state, length=stepper.length)
+        return True
+
+    def with_parameters(self, _p: Array, problem_with: Callable[[], Problem]) -> bool:
+        """Go on in the same equations with other parameters, those of a problem."""
+        problem, old = problem_with(), self._problem.guards
+        guards = problem.guards
+        if guards is not None and old is not None:
+            old = replace(old, values=guards.values)
+        values = {"rhs": problem.rhs, "machine": problem.machine, "switches": problem.switches, "guards": old}
+        self._problem, self.at = changed(self._problem, **values), self.at._replace(length=0.0)
+        return True
+
+
 class _MachineStepper:
     """The method.
 
@@ -130,8 +200,13 @@ class _MachineStepper:
 
     def open(self, piece: SmoothInterval, t: float, x: Array) -> Array:
         self._piece, self._end, self._limit = piece, piece.end, self._longest
-        self._step, self._ahead = self._first_step(t, x), FIRST_AHEAD
+        self.length, self._ahead = self._first_step(t, x), FIRST_AHEAD
         return x
+
+    def resume(self, at: MachineSnapshot, end: float) -> None:
+        """Go on to a time in s at once."""
+        self._piece, self._end, self._limit, self._ahead = at.piece, end, at.longest, MOST_SMOOTH
+        self.length = at.length or self._first_step(at.t, at.x)
 
     def step(self, t: float, x: Array) -> Step:
         if t >= self._end:  # up to a switch
@@ -140,7 +215,7 @@ class _MachineStepper:
         ends, lengths, states = np.empty(room), np.empty(room), np.empty((room, x.size))
         middles, piece, machine = np.empty((room if self._watches else 0, x.size)), self._piece, self._machine
         rates, p, span, x = machine.rates.address, machine.p, np.array([piece.low, piece.high]), np.ascontiguousarray(x)
-        limits = np.array([t, self._end, self._step, self._limit])
+        limits = np.array([t, self._end, self.length, self._limit])
         count, following, tried = advance(
             rates, p, span, limits, x, self._problem.atol, self._problem.rtol, ends, lengths, states, FIRST[0],
             middles,
@@ -154,7 +229,7 @@ class _MachineStepper:
         first = self._clear(batch, ends[:count], states[:count], middles) if self._watches else count
         number = min(first, count - 1)
         self._ahead = min(2 * self._ahead, MOST_AHEAD) if first == count else FIRST_AHEAD
-        self._step = following if number == count - 1 else lengths[number + 1]
+        self.length = following if number == count - 1 else lengths[number + 1]
         self._taken += steps[:number]
         self._last = steps[number]
         before = (ends[:number], states[:number]) if number else None
