@@ -171,7 +171,7 @@ def test_a_part_without_parameters_is_said_to_have_none(tmp_path: Path, capsys: 
         ("pull.tau={ x = [0, 1], y = [0", "Write a table as { x = [0.0, 1.0], y = [0.0, 5.0] }"),
         ("pull.tau={ x = [0, 1], y = [0, 'a'] }", "Tables hold numbers alone"),
         ("pull.tau={ x = [1, 0], y = [0, 1] }", "x must increase strictly"),
-        ("line.model=Lumps(3)", "line.model=Lumps(3): model of Shaft 'line' is none"),
+        ("line.model=Lumps(3)", "line.model=Lumps(3): model of Shaft 'line' cannot be read"),
         ("pull.tau=sine(t)", "pull.tau=sine(t): "),
     ],
 )

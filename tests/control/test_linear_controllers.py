@@ -361,7 +361,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"A": [[1.0], [2.0, 3.0]]}, "no matrix of up to 64 by 64 finite numbers"),
     ({"D": float("nan")}, "no matrix"),
     ({"D": "[[1"}, "no matrix"),
-    ({"D": "a"}, "D is none: 'a' is no matrix"),
+    ({"D": "a"}, "D cannot be read: 'a' is no matrix"),
     ({"D": None}, "A, B and C, or D must be given"),
     ({"D": None, "A": -1.0, "B": 1.0}, "C must be given"),
     ({"D": [[1.0 + 2.0j]]}, "no matrix"),
@@ -395,7 +395,7 @@ def test_what_does_not_fit_together_is_refused_with_the_shape_that_would(values:
         ([], [1], r"numerator = \[\] must be one row"),
         ([[1, 2], [3, 4]], [1, 1, 1, 1, 1], "numerator = .* must be one row"),
         ([1, 1], [1e-300, 1], "next to zero beside the others"),
-        ([float("nan")], [1], r"numerator is none: \[nan\]"),
+        ([float("nan")], [1], r"numerator cannot be read: \[nan\]"),
     ],
 )
 def test_a_transfer_function_without_states_for_it_is_refused(above: Any, below: Any, why: str) -> None:

@@ -106,9 +106,9 @@ class EventIteration:
         holding = resting(state, after) if ends else {}
         if not holding:
             return self._fewest(t, after, state, met)
-        # Who carries is told anew. A law that falls at once would tell a way in which nothing moves: of two frictions
-        # one has given way at rest, and now the other one does, backward. Once it moves, the first one has less torque
-        # than it holds at rest, and would move forward instead, which the other one does not let it.
+        # All parts that hold are decided together, from rest. To follow the guard that was met alone could end in a mode
+        # in which nothing moves: of two frictions one has given way at rest, and now the other one does, backward. With
+        # that motion the first one has less torque than it holds at rest, and would move forward, which the other bars.
         modes = state.regime.modes
         stuck = self.transfer.to_modes(state, after, with_modes(modes, self.transfer.compatible(modes, holding)))
         new, transitions = self._consistent(t, after, stuck, None)
@@ -119,10 +119,10 @@ class EventIteration:
         return new, _together([*differences(t, self.machines, modes, stuck.regime.modes), *transitions])
 
     def _fewest(self, t: float, after: float, state: HybridState, met: int | None) -> EventOutcome:
-        """Of several guards that are met at one instant, rounding tells which of them ends the phase.
+        """The outcome with the fewest transitions, of those in which another one of the guards met goes first.
 
-        So each is followed first, and the fewest transitions are taken: two flanks that one torque has pressed together
-        part where they have to, and not at both.
+        Of several guards that are met at one instant, rounding decides which one the engine reports. Two contacts in a
+        row that carry the same torque, for example, reach zero together; one of them opens, and the other one stays.
         """
         if met is None:
             return self._consistent(t, after, state, None)
