@@ -106,9 +106,10 @@ class EventIteration:
         holding = resting(state, after) if ends else {}
         if not holding:
             return self._fewest(t, after, state, met)
-        # All parts that hold are decided together, from rest. To follow the guard that was met alone could end in a mode
-        # in which nothing moves: of two frictions one has given way at rest, and now the other one does, backward. With
-        # that motion the first one has less torque than it holds at rest, and would move forward, which the other bars.
+        # All parts that hold are decided together, from rest. To follow the guard that was met alone could end in a
+        # mode in which nothing moves: of two frictions one has given way at rest, and now the other one does, backward.
+        # With that motion the first one has less torque than it holds at rest, and would move forward, which the other
+        # one bars.
         modes = state.regime.modes
         stuck = self.transfer.to_modes(state, after, with_modes(modes, self.transfer.compatible(modes, holding)))
         new, transitions = self._consistent(t, after, stuck, None)
