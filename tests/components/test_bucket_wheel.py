@@ -110,7 +110,7 @@ def test_a_wrong_resistance_of_a_soil_is_said_of_the_soil() -> None:
     ("wrong", "answer"),
     [
         ({"soil": "gold"}, "fault zone, transitional zone, grey clay"),
-        ({"soil": "Soil(-1.0, 0.0)"}, "is none"),
+        ({"soil": "Soil(-1.0, 0.0)"}, "cannot be read"),
         ({"buckets": 8.5}, "whole number from 3 to 100"),
         ({"buckets": "many"}, "whole number from 3 to 100"),
         ({"alpha": 1.5}, "above"),

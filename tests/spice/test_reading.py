@@ -489,6 +489,12 @@ def test_what_lcapy_has_besides_is_refused_with_its_line(line: str, words: str) 
         sw.spice.read(f"R1 1 0 1; right\n{line}\n", {"A": 1.0})
 
 
+def test_a_pulse_that_begins_after_the_end_is_low_until_then() -> None:
+    circuit = sw.spice.read("late\nV1 a 0 PULSE(2 5 9 1m 1m 1m 10m)\nR1 a 0 1\nC1 a 0 1u\n.tran 1m 0.1\n.end\n")
+    motion = circuit.network.simulate(0.1, t_eval=3)
+    assert list(motion["V1.u"]) == [2.0, 2.0, 2.0]
+
+
 def test_a_pulse_without_a_width_stays_where_no_end_is_told() -> None:
     """SPICE takes the end of the analysis for the width; without one the pulse has no end."""
     circuit = sw.spice.read("t\nV1 a 0 PULSE(0 5 1m 1u 1u)\nR1 a b 1k\nC1 b 0 1u\n.end\n")

@@ -101,7 +101,7 @@ def _pulse(line: NetlistLine, numbers: list[float], step: float, end: float) -> 
         raise line.error("PULSE has a period and no width, and there is no .tran whose end would give one")
     if period < rise + width + fall:
         raise line.error(f"PULSE has a period of {period:g} s, shorter than its pulse of {rise + width + fall:g} s")
-    count = int((end - delay) / period) + 1 if end else MOST_PERIODS + 1
+    count = max(1, int((end - delay) / period) + 1) if end else MOST_PERIODS + 1
     if count > MOST_PERIODS:
         shape = Table(*zip(*corners, strict=True))
         return Piecewise((low, t < delay), (shape(t - delay - period * sympy.floor((t - delay) / period)), True))
