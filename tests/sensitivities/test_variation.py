@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 from shaftwork.core.errors import SimulationError
-from shaftwork.sensitivities.motion_slopes import Array, Coefficients, Variation, variation
+from shaftwork.sensitivities.variation import Array, Coefficients, Variation, variation
 
 RTOL = 1e-10
 

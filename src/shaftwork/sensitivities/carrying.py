@@ -65,14 +65,19 @@ class SensitivityTransfer:
 
     Args:
         equation_sets: the sets of equations.
+        values: parameters that differ from the network's.
         equations: those of a model, ready for sensitivities.
         sizes: (n,) of the states of a model.
     """
 
     def __init__(
-        self, equation_sets: EquationSets, equations: Callable[[Model], Differentiated], sizes: Callable[[Model], Array]
+        self,
+        equation_sets: EquationSets,
+        values: Mapping[str, float],
+        equations: Callable[[Model], Differentiated],
+        sizes: Callable[[Model], Array],
     ) -> None:
-        self._equation_sets, self._equations, self._sizes = equation_sets, equations, sizes
+        self._equation_sets, self._values, self._equations, self._sizes = equation_sets, values, equations, sizes
 
     def over(
         self, before: Leg, after: Leg, ends: Sequence[End], transitions: Sequence[Transition]
@@ -153,7 +158,7 @@ class SensitivityTransfer:
         model, p, (x, _, slopes, shift) = before.model, before.p, end
         for step in steps:
             equations, old = self._equation_sets.of(step.modes), p
-            p = equations.vector({}, self._equation_sets.numbers(step.modes))
+            p = equations.vector(self._values, self._equation_sets.numbers(step.modes))
             if equations.model is model and step.rebound is None:
                 continue
             stored = self._stored(model, t, x, old, slopes, shift)
@@ -163,7 +168,7 @@ class SensitivityTransfer:
                     equations, p, stored, self._stored(equations.model, t, x, p, slopes, shift), step.rebound
                 )
                 equations = self._equation_sets.of(step.parted)
-                p = equations.vector({}, self._equation_sets.numbers(step.parted))
+                p = equations.vector(self._values, self._equation_sets.numbers(step.parted))
                 x, slopes = self._taken_over(equations, t, p, stored, shift)
             model = equations.model
         return x, slopes

@@ -215,6 +215,11 @@ class ValueWithSlopes:
         by_states, by_parameters, by_time = (slopes(t, x, p)[0] for slopes in self._by)
         return by_states, by_parameters, float(by_time[0])
 
+    def along(self, times: Array, states: Array, p: Array) -> tuple[Array, Array]:
+        """Its slopes by states (k, n) and by parameters (k, m), at times (k,) in s."""
+        by_states, by_parameters, _ = self._by
+        return by_states.along(times, states, p)[:, 0], by_parameters.along(times, states, p)[:, 0]
+
 
 class Differentiated:
     """Equations that are ready for sensitivities.

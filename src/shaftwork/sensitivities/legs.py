@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, cast
 
@@ -130,6 +130,7 @@ class DifferentiatedMotion:
         transitions: in their order.
         start: what it starts from, in the equations in which nothing is joined; None where no part changes its mode.
         equation_sets: the sets of equations, likewise.
+        values: parameters that differ from the network's.
     """
 
     solution: Solution
@@ -137,6 +138,7 @@ class DifferentiatedMotion:
     transitions: tuple[Transition, ...] = ()
     start: Leg | None = None
     equation_sets: EquationSets | None = None
+    values: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def models(self) -> tuple[Model, ...]:
@@ -145,32 +147,50 @@ class DifferentiatedMotion:
         return tuple(dict.fromkeys(leg.model for leg in legs))
 
 
-def motion_of(model: Model, span: tuple[float, float], initial: Given, rtol: float) -> DifferentiatedMotion:
+def motion_of(
+    model: Model, span: tuple[float, float], initial: Given, rtol: float, values: Mapping[str, float]
+) -> DifferentiatedMotion:
     """The motion of a network.
+
+    Args:
+        model: the compiled network.
+        span: start and end, s.
+        initial: start values.
+        rtol: relative tolerance.
+        values: parameters that differ from the network's, and change no structure.
 
     Raises:
         SimulationError: it could not be found, or a prescribed speed jumps.
     """
     if model.phased:
-        differentiated = _through_phases(cast("HybridModel", model), span, initial, rtol)
+        differentiated = _through_phases(cast("HybridModel", model), span, initial, rtol, values)
     else:
-        motion = model.simulate(span[1], t_start=span[0], initial=initial, rtol=rtol, t_eval="steps")
-        differentiated = DifferentiatedMotion(motion, tuple(_legs_of_model(model, motion)))
+        motion = model.simulate(span[1], t_start=span[0], initial=initial, rtol=rtol, t_eval="steps", parameters=values)
+        differentiated = DifferentiatedMotion(
+            motion, tuple(_legs_of_model(model, motion, model.vector(values))), values=values
+        )
     _refuse_impulses(differentiated)
     return differentiated
 
 
-def _through_phases(model: HybridModel, span: tuple[float, float], initial: Given, rtol: float) -> DifferentiatedMotion:
+def _through_phases(
+    model: HybridModel, span: tuple[float, float], initial: Given, rtol: float, values: Mapping[str, float]
+) -> DifferentiatedMotion:
     """The motion of a network whose parts change their mode."""
     from shaftwork.hybrid.hybrid_run import HybridRun
     from shaftwork.hybrid.hybrid_solution import solution
 
     run = HybridRun(
-        model.equation_sets, {}, Demand(span, rtol, None, None, "auto", Problem.max_steps, None), by_combination=True
+        model.equation_sets,
+        values,
+        Demand(span, rtol, None, None, "auto", Problem.max_steps, None),
+        by_combination=True,
     )
     run.march(initial)
     legs, transitions = tuple(_legs_of_run(run)), tuple(run.transitions)
-    return DifferentiatedMotion(solution(run, model.name), legs, transitions, _start(run, initial), model.equation_sets)
+    return DifferentiatedMotion(
+        solution(run, model.name), legs, transitions, _start(run, initial), model.equation_sets, values
+    )
 
 
 def _start(run: HybridRun, initial: Given) -> Leg:
@@ -225,13 +245,13 @@ def _states(segment: Segment) -> Callable[[Array], Array]:
     return lambda times: dense(times)[:, :size]
 
 
-def _legs_of_model(model: Model, solution: Solution) -> Iterator[Leg]:
+def _legs_of_model(model: Model, solution: Solution, p: Array) -> Iterator[Leg]:
     """The legs of the motion of a network in which no part changes its mode."""
     first, last = float(solution.steps[0]), float(solution.steps[-1])
-    instants = model.switching.timeline(model.defaults, first, last)
+    instants = model.switching.timeline(p, first, last)
     inner = (time for time in instants.times if first < time < last)
     for start, end in pairwise((first, *inner, last)):
-        yield _leg(model, model.defaults, solution.dense, solution.steps, (start, end), instants)
+        yield _leg(model, p, solution.dense, solution.steps, (start, end), instants)
 
 
 def _leg(

@@ -1,30 +1,21 @@
-"""A motion together with its derivatives by parameters, through all that changes on the way.
-
-The variational equation is linear along a motion that is known, and is solved by Gauss collocation. All steps are made
-at once: a step takes Y to (1 + P) Y + Q, whatever Y is, so P and Q of every step come from one stack of linear systems,
-and only their products follow one after another.
-"""
+"""A motion together with its derivatives by parameters, through all that changes on the way."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from sympy import Expr, Symbol
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import AccuracyWarning, ParameterError, SimulationError
 from shaftwork.core.notices import warn
 from shaftwork.formulation.observables import Observables
-from shaftwork.numerics.polynomials import to_integrals
 from shaftwork.numerics.tolerances import SAME, TYPED
 from shaftwork.numerics.zeros import zero
 from shaftwork.pipeline.model import Model
-from shaftwork.results.observer import blocks
 from shaftwork.sensitivities.carrying import End, SensitivityTransfer
 from shaftwork.sensitivities.differentiation import Differentiated, ValueWithSlopes, rows_of
 from shaftwork.sensitivities.legs import DifferentiatedMotion, Leg, parted
@@ -33,143 +24,37 @@ from shaftwork.sensitivities.saltation import ADVICE, Jump, JumpConditions, by_c
 if TYPE_CHECKING:
     from shaftwork.hybrid.hybrid_state import Transition
 
-STAGES = 6
-"""Of a step: order 12, and no stage on its ends, where laws jump."""
 
-Coefficients = Callable[[Array], tuple[Array, Array]]
-"""From times (k,) to A (k, N, n) and B (k, N, m) of Y' = A Y[:n] + B; rows behind the first n are mere integrals."""
-
-_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(STAGES)
-NODES = (_POINTS + 1) / 2
-# integrals from the start of a step to each node and to its end, from values at the nodes
-_TO_NODES, _TO_END = to_integrals(_POINTS) / 2, _WEIGHTS / 2
-
-
-@dataclass(frozen=True, eq=False)
-class Variation:
-    """The solution of the variational equation over a span of time.
+class DifferentiatedEquations:
+    """The equations of every model with their derivatives by parameters, each made once.
 
     Args:
-        coefficients: A and B.
-        ends: (s,) ends of the steps, s.
-        values: (s, N, m) Y there.
+        parameters: names of m of them.
+        quantities: names of what is read.
+        integrands: name and power of what is integrated over time.
     """
 
-    coefficients: Coefficients
-    ends: Array
-    values: Array
+    def __init__(
+        self, parameters: Sequence[str], quantities: Sequence[str], integrands: Sequence[tuple[str, int]] = ()
+    ) -> None:
+        self.parameters, self._quantities, self._integrands = tuple(parameters), tuple(quantities), tuple(integrands)
+        self._symbols = tuple(Symbol(name, real=True) for name in parameters)
+        self._equations: dict[Model, Differentiated] = {}
 
-    def at(self, t: float) -> Array:
-        """(N, m) Y at a time in s."""
-        k = int(np.clip(np.searchsorted(self.ends, t, side="right") - 1, 0, len(self.ends) - 1))
-        length = t - self.ends[k]
-        if length == 0.0 or k == len(self.ends) - 1:
-            return np.asarray(self.values[k])
-        return _stepped(_maps(self.coefficients, self.ends[k : k + 1], np.array([length]))[0], self.values[k])
+    def __call__(self, model: Model) -> Differentiated:
+        """Those of a model.
 
-
-def variation(
-    coefficients: Coefficients, ends: Array, start: Array, sizes: Array, least: Array, rtol: float
-) -> Variation:
-    """Solve Y' = A Y[:n] + B; steps are halved until the halves say the same.
-
-    Args:
-        coefficients: A and B, smooth between the first and the last of the ends; never asked for there.
-        ends: (s,) ends of the steps of the run, increasing, s.
-        start: (N, m) Y at the first of them.
-        sizes: (N,) sizes of what Y are the slopes of: those of one parameter are held against each other by them.
-        least: (m,) slopes, as parts of those sizes, below which all is rounding.
-        rtol: error of a step, as a part of the largest slope by the same parameter so far.
-
-    Raises:
-        SimulationError: it takes too many steps, or there is no value.
-    """
-    # Eight steps of the run are one at first: an implicit method need not follow what has died away.
-    ends = np.append(ends[:-1:8], ends[-1])
-    begins, lengths = ends[:-1], np.diff(ends)
-    steps = _Steps(begins, lengths, _maps(coefficients, begins, lengths), np.zeros(len(lengths), dtype=bool))
-    while True:
-        parts, whole = _parted(coefficients, steps)
-        values = _passed(parts.maps, start)
-        errors = np.abs(_stepped(steps.maps[~steps.right], values[whole]) - values[whole + 2])
-        largest = np.maximum.accumulate((np.abs(values) / sizes[:, None]).max(axis=1, initial=0.0), axis=0)
-        scale = sizes[:, None] * np.maximum(largest, least)[:, None]
-        # Two halves are more than 64 times as close to the solution as to the whole.
-        accurate = (errors <= 64 * rtol * scale[whole + 2]).all(axis=(1, 2))
-        parts.right[whole] = parts.right[whole + 1] = accurate
-        if parts.right.all():
-            return Variation(coefficients, np.append(parts.begins, ends[-1]), values)
-        if len(parts.begins) > 1_000_000 or not np.isfinite(values).all():
-            worst = int(np.argmin(parts.right))
-            raise SimulationError(f"The sensitivities could not be integrated beyond t = {parts.begins[worst]:.9g} s.")
-        steps = parts
-
-
-class _Steps(NamedTuple):
-    """Steps in a row.
-
-    Args:
-        begins: (s,) s.
-        lengths: (s,) s.
-        maps: (s, N, n + m) see `_maps`.
-        right: (s,) which of them need no smaller ones.
-    """
-
-    begins: Array
-    lengths: Array
-    maps: Array
-    right: NDArray[np.bool_]
-
-
-def _parted(coefficients: Coefficients, steps: _Steps) -> tuple[_Steps, NDArray[np.intp]]:
-    """Two halves for each step that is not right, and where the first ones are."""
-    order = np.repeat(np.arange(len(steps.begins)), np.where(steps.right, 1, 2))
-    first, halved = np.append(True, order[1:] != order[:-1]), ~steps.right[order]
-    lengths = np.where(halved, steps.lengths[order] / 2, steps.lengths[order])
-    begins = np.where(first, steps.begins[order], steps.begins[order] + lengths)
-    maps = steps.maps[order]
-    maps[halved] = _maps(coefficients, begins[halved], lengths[halved])
-    return _Steps(begins, lengths, maps, ~halved), np.flatnonzero(first & halved)
-
-
-def _passed(maps: Array, start: Array) -> Array:
-    """(s + 1, N, m) Y before the first step and after each."""
-    values = np.empty((len(maps) + 1, *start.shape))
-    values[0] = start
-    for k, one in enumerate(maps):
-        values[k + 1] = _stepped(one, values[k])
-    return values
-
-
-def _stepped(maps: Array, before: Array) -> Array:
-    """(..., N, m) Y after steps, from Y before them."""
-    size = maps.shape[-1] - before.shape[-1]
-    return np.asarray(before + maps[..., :size] @ before[..., :size, :] + maps[..., size:])
-
-
-def _maps(coefficients: Coefficients, begins: Array, lengths: Array) -> Array:
-    """(s, N, n + m) of each step P and, beside it, Q."""
-    A, B = coefficients((begins[:, None] + lengths[:, None] * NODES).ravel())
-    (_, every, size), columns = A.shape, A.shape[2] + B.shape[2]
-    both = np.concatenate([A, B], axis=2).reshape(len(begins), STAGES, every, columns)
-    maps = np.empty((len(begins), every, columns))
-    for steps in blocks(len(begins), (STAGES * size) ** 2):
-        maps[steps] = _solved(both[steps], size, lengths[steps])
-    return maps
-
-
-def _solved(both: Array, size: int, lengths: Array) -> Array:
-    """The same for as many steps as are solved at once, from A and B (s, stages, N, n + m)."""
-    count, columns = len(both), both.shape[-1]
-    h = lengths[:, None, None, None]
-    # K_i = A_i (Y + h sum_j a_ij K_j) + B_i for the slopes K at the stages
-    system = -np.einsum("s,ij,sipq->sipjq", lengths, _TO_NODES, both[:, :, :size, :size])
-    system = system.reshape(count, STAGES * size, STAGES * size) + np.eye(STAGES * size)
-    right = both[:, :, :size].reshape(count, STAGES * size, columns)
-    K = np.linalg.solve(system, right).reshape(count, STAGES, size, columns)
-    moved = h * np.einsum("ij,sjpc->sipc", _TO_NODES, K)
-    beside = both[:, :, size:] + both[:, :, size:, :size] @ moved
-    return np.asarray(lengths[:, None, None] * np.einsum("i,sipc->spc", _TO_END, np.concatenate([K, beside], axis=2)))
+        Raises:
+            CompileError: they are too large to be symbolic.
+            ParameterError: a quantity is none that has a derivative.
+        """
+        if model not in self._equations:
+            rows = rows_of(model)
+            expressed = Observables(model.form, rows)
+            quantities = {name: _expression_of(name, expressed) for name in self._quantities}
+            integrands = [quantities[name] ** power for name, power in self._integrands]
+            self._equations[model] = Differentiated(model.form, rows, self._symbols, quantities, integrands)
+        return self._equations[model]
 
 
 class MotionSlopes:
@@ -177,9 +62,8 @@ class MotionSlopes:
 
     Args:
         motion: the motion.
-        parameters: m of them with their values in SI.
-        quantities: names of what is read.
-        integrands: name and power of what is integrated over time.
+        equations: with their derivatives by m parameters.
+        parameters: (m,) their values in SI.
         rtol: relative tolerance of the derivatives.
 
     Raises:
@@ -189,19 +73,9 @@ class MotionSlopes:
     """
 
     def __init__(
-        self,
-        motion: DifferentiatedMotion,
-        parameters: Mapping[str, float],
-        quantities: Sequence[str],
-        integrands: Sequence[tuple[str, int]],
-        rtol: float,
+        self, motion: DifferentiatedMotion, equations: DifferentiatedEquations, parameters: Array, rtol: float
     ) -> None:
-        self._motion, self._rtol = motion, rtol
-        self.parameters = np.array(list(parameters.values()))
-        """(m,) in SI."""
-        self._symbols = tuple(Symbol(name, real=True) for name in parameters)
-        self._quantities, self._integrands = tuple(quantities), tuple(integrands)
-        self._equations: dict[Model, Differentiated] = {}
+        self._motion, self.equations, self.parameters, self._rtol = motion, equations, parameters, rtol
         self.legs = tuple(part for leg in motion.legs for part in parted(leg, self.equations(leg.model)))
         self._sizes: dict[Model, Array] = {}
         self._swiftest: dict[Model, Array] = {}
@@ -210,16 +84,6 @@ class MotionSlopes:
         self._variations: list[Variation] = []
         self._shifts: list[Array | None] = []
         self._integrate()
-
-    def equations(self, model: Model) -> Differentiated:
-        """The equations of a model with their derivatives; made once."""
-        if model not in self._equations:
-            rows = rows_of(model)
-            expressed = Observables(model.form, rows)
-            quantities = {name: _expression_of(name, expressed) for name in self._quantities}
-            integrands = [quantities[name] ** power for name, power in self._integrands]
-            self._equations[model] = Differentiated(model.form, rows, self._symbols, quantities, integrands)
-        return self._equations[model]
 
     def _measure(self, leg: Leg) -> None:
         """Sizes of states, and of rates, as far as they go in a leg."""
@@ -235,9 +99,9 @@ class MotionSlopes:
         return np.where(largest > 0, largest, 1.0)
 
     def _integrate(self) -> None:
-        motion, count = self._motion, len(self._symbols)
+        motion, count = self._motion, self.parameters.size
         sets = motion.equation_sets
-        carrying = None if sets is None else SensitivityTransfer(sets, self.equations, self.sizes)
+        carrying = None if sets is None else SensitivityTransfer(sets, motion.values, self.equations, self.sizes)
         length, fixed = self.legs[-1].end - self.legs[0].start, np.zeros(count)
         jumps = JumpConditions(self.equations, carrying, self.sizes, self._swiftest.__getitem__, length)
         slopes = np.zeros((self._swiftest[self.legs[0].model].size, count))
@@ -325,7 +189,7 @@ class MotionSlopes:
         times, states = leg.read(np.array([t]))
         shown = self._shown(quantity, leg)
         by_states, by_parameters, _ = shown.slopes(float(times[0]), states[0], leg.p)
-        total = by_states @ self._variations[number].at(t)[: len(by_states)] + by_parameters
+        total = by_states @ self._variations[number].at(np.array([t]))[0, : len(by_states)] + by_parameters
         end = number if t - leg.start <= near else number + 1 if leg.end - t <= near else None
         if end is None or not (rate := self._rate(quantity, leg, t)):
             return np.asarray(total)
@@ -336,6 +200,17 @@ class MotionSlopes:
                 f"derivative. {ADVICE}"
             )
         return np.asarray(total + rate * shift)
+
+    def along(self, quantity: str, times: Array) -> Array:
+        """(k, m) derivatives of a quantity at times (k,) in s; where two legs meet, in the later one."""
+        slopes, index = np.empty((len(times), self.parameters.size)), self._leg_at(times)
+        for number in np.unique(index).tolist():
+            leg, here = self.legs[number], index == number
+            read, states = leg.read(times[here])
+            by_states, by_parameters = self._shown(quantity, leg).along(read, states, leg.p)
+            dx = self._variations[number].at(times[here])[:, : states.shape[1]]
+            slopes[here] = (by_states[:, None, :] @ dx)[:, 0] + by_parameters
+        return slopes
 
     def turning(self, quantity: str, t: float) -> float:
         """The time in s at which a quantity turns, from one that is near it; this one where it does not turn there.

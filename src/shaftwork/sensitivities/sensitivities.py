@@ -29,7 +29,7 @@ from shaftwork.results.observer import Complex
 from shaftwork.results.solution import Solution
 from shaftwork.sensitivities.differentiation import SlopeMatrix, rows_of
 from shaftwork.sensitivities.legs import motion_of
-from shaftwork.sensitivities.motion_slopes import MotionSlopes
+from shaftwork.sensitivities.motion_slopes import DifferentiatedEquations, MotionSlopes
 from shaftwork.sensitivities.sensitivity_tables import FrequencySensitivities, MotionSensitivities
 
 if TYPE_CHECKING:
@@ -157,14 +157,15 @@ def motion_sensitivities(
     smooth_parameters(model, names, (model,), span)  # what is wrong with them is said before the motion is made
     integrands = dict.fromkeys(item for measure in read.values() if (item := integrand(measure)) is not None)
     # The motion is a hundred times as close as its derivatives; no engine takes a tolerance below 1e-13.
-    motion = motion_of(model, span, initial, max(1e-2 * tolerance, 1e-13))
+    motion = motion_of(model, span, initial, max(1e-2 * tolerance, 1e-13), {})
     names = smooth_parameters(model, names, motion.models, span)
     names = without_start(model, names, initial, span, are_asked=parameters is not None)
     nominal = {name: model.parameters[name] for name in names}
     quantities = dict.fromkeys(measure.quantity for measure in read.values())
     if unknown := [name for name in quantities if name not in motion.solution]:
         _ = motion.solution[unknown[0]]  # raises, with what there is
-    slopes = MotionSlopes(motion, nominal, tuple(quantities), tuple(integrands), tolerance)
+    equations = DifferentiatedEquations(names, tuple(quantities), tuple(integrands))
+    slopes = MotionSlopes(motion, equations, np.array(list(nominal.values())), tolerance)
     integrals = dict(zip(integrands, slopes.integrals(), strict=True))
     results = {name: measured(item, motion.solution, slopes, integrals) for name, item in read.items()}
     values = {name: value for name, (value, _) in results.items()}
