@@ -20,6 +20,7 @@ from shaftwork.sensitivities.carrying import End, SensitivityTransfer
 from shaftwork.sensitivities.differentiation import Differentiated, ValueWithSlopes, rows_of
 from shaftwork.sensitivities.legs import DifferentiatedMotion, Leg, parted
 from shaftwork.sensitivities.saltation import ADVICE, Jump, JumpConditions, by_chance
+from shaftwork.sensitivities.variation import Coefficients, Variation, variation
 
 if TYPE_CHECKING:
     from shaftwork.hybrid.hybrid_state import Transition
