@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, cast
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.linalg import norm
@@ -12,37 +11,20 @@ from scipy.linalg import eig, matrix_balance
 from sympy import Symbol
 
 from shaftwork.codegen.array_form.elements import Array
-from shaftwork.codegen.compiled_model import CompiledModel
-from shaftwork.components.law_slopes import slope
-from shaftwork.components.laws import t as TIME
-from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.errors import ParameterError, SimulationError
 from shaftwork.formulation.sampling_instants import refuse_sampled
 from shaftwork.numerics.tolerances import EQUAL, TYPED
-from shaftwork.pipeline.arguments import Given, Point, Time, by_name, relative_tolerance, time_span
-from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.motion_start import refuse_motion
+from shaftwork.pipeline.arguments import Given, Point, Time, by_name, time_span
 from shaftwork.pipeline.network import Network, network_of
 from shaftwork.results.course import turning_points
 from shaftwork.results.measures import EXTREMES, KINDS, POWERS, Measure
 from shaftwork.results.observer import Complex
 from shaftwork.results.solution import Solution
 from shaftwork.sensitivities.differentiation import SlopeMatrix, rows_of
-from shaftwork.sensitivities.legs import motion_of
-from shaftwork.sensitivities.motion_slopes import DifferentiatedEquations, MotionSlopes
+from shaftwork.sensitivities.motion_slopes import MotionSlopes
+from shaftwork.sensitivities.parametric_motion import ParametricMotion
 from shaftwork.sensitivities.sensitivity_tables import FrequencySensitivities, MotionSensitivities
-
-if TYPE_CHECKING:
-    from shaftwork.hybrid.hybrid_model import HybridModel
-
-NO_DERIVATIVE = {
-    "decisive": "decides which equations hold, so nothing is smooth in it. Give it a value that is not exactly zero, "
-    "and ratios that are not alike.",
-    "whole": "is a whole number, so nothing is smooth in it. Take the difference of two variants, studies.sweep(...).",
-    "seed": "is the seed of a noise: another number is another noise. Leave it out.",
-    "edge": "moves a switch that is exactly at the start or at the end of the motion, where it comes in or goes out. "
-    "Take another t_end, or leave it out.",
-}
+from shaftwork.sensitivities.smooth_parameters import smooth_parameters
 
 
 def frequency_sensitivities(
@@ -143,33 +125,19 @@ def motion_sensitivities(
         SimulationError: there is no derivative: something is only touched, what comes together has no order, a
             prescribed speed jumps against an inertia, or two extremes are of one height.
     """
-    read, names, model = _measures(measures), _listed(parameters), network_of(net).compile()
-    refuse_sampled(model.form, "its derivatives by parameters are not followed from instant to instant")
-    refuse_motion(initial, "motion_sensitivities")
-    span, tolerance = time_span(0.0, t_end), relative_tolerance(rtol)
-    states = {state.name for state in model.form.states}
-    if unknown := [name for name in initial or {} if name not in states]:
-        raise ParameterError(
-            f"'{unknown[0]}' is no state, so it starts at another state for other parameters. Give start values of "
-            f"states: {', '.join(sorted(states))}."
-        )
-    rows_of(model)
-    smooth_parameters(model, names, (model,), span)  # what is wrong with them is said before the motion is made
+    read = _measures(measures)
     integrands = dict.fromkeys(item for measure in read.values() if (item := integrand(measure)) is not None)
-    # The motion is a hundred times as close as its derivatives; no engine takes a tolerance below 1e-13.
-    motion = motion_of(model, span, initial, max(1e-2 * tolerance, 1e-13), {})
-    names = smooth_parameters(model, names, motion.models, span)
-    names = without_start(model, names, initial, span, are_asked=parameters is not None)
-    nominal = {name: model.parameters[name] for name in names}
     quantities = dict.fromkeys(measure.quantity for measure in read.values())
-    if unknown := [name for name in quantities if name not in motion.solution]:
-        _ = motion.solution[unknown[0]]  # raises, with what there is
-    equations = DifferentiatedEquations(names, tuple(quantities), tuple(integrands))
-    slopes = MotionSlopes(motion, equations, np.array(list(nominal.values())), tolerance)
+    motion = ParametricMotion(
+        net, tuple(quantities), tuple(integrands), _listed(parameters), time_span(0.0, t_end), initial, rtol
+    )
+    solution, slopes = motion.nominal.solution, motion.slopes(motion.nominal)
     integrals = dict(zip(integrands, slopes.integrals(), strict=True))
-    results = {name: measured(item, motion.solution, slopes, integrals) for name, item in read.items()}
+    results = {name: measured(item, solution, slopes, integrals) for name, item in read.items()}
     values = {name: value for name, (value, _) in results.items()}
-    return MotionSensitivities(model.name, nominal, values, {name: by for name, (_, by) in results.items()})
+    return MotionSensitivities(
+        motion.model.name, motion.parameters, values, {name: by for name, (_, by) in results.items()}
+    )
 
 
 def _measures(measures: Mapping[str, str] | Sequence[str]) -> dict[str, Measure]:
@@ -247,108 +215,3 @@ def _extreme(measure: Measure, slopes: MotionSlopes) -> tuple[float, Array]:
         )
     best = int(heights.argmax())
     return float(signs[best] * turns.values[best]), np.asarray(derivatives[highest.index(best)])
-
-
-def smooth_parameters(
-    model: Model, names: Sequence[str] | None, used: Sequence[CompiledModel], span: tuple[float, float] | None = None
-) -> tuple[str, ...]:
-    """The parameters by which to differentiate.
-
-    Args:
-        model: the compiled network.
-        names: of parameters; None for all in which the equations are smooth.
-        used: models of all equations that hold on the way.
-        span: start and end of the motion, s; None where there is none.
-
-    Raises:
-        ParameterError: there is no such parameter, or nothing is smooth in it.
-    """
-    declared = {
-        f"{placed.part.name}.{name}": parameter
-        for placed in model.netlist.placed
-        for name, parameter in placed.part.declared.items()
-    }
-    numbers = [name for name in model.parameters if name in declared]
-    reasons = {name: "whole" for name in numbers if declared[name].whole}
-    for one in used:
-        reasons |= dict.fromkeys((*one.form.graph.zeros, *one.form.tree.frozen), "decisive")
-        reasons |= dict.fromkeys(_seeds(one), "seed")
-        if span is not None:
-            reasons |= dict.fromkeys(_at_edges(one, span), "edge")
-    if names is None:
-        return tuple(name for name in numbers if name not in reasons)
-    for name in names:
-        if name in reasons:
-            raise ParameterError(f"'{name}' {NO_DERIVATIVE[reasons[name]]}")
-        if name not in numbers:
-            raise ParameterError(f"There is no parameter '{name}' with a number. There are: {', '.join(numbers)}.")
-    return tuple(names)
-
-
-def _seeds(model: CompiledModel) -> Iterator[str]:
-    graph = model.form.graph
-    for branch in graph.branches:
-        law = graph.in_network_symbols(branch.template.law, branch)
-        for noise in law.atoms(HeldNoise, SmoothNoise):
-            yield from (symbol.name for symbol in noise.args[1].free_symbols)
-
-
-def _at_edges(model: CompiledModel, span: tuple[float, float]) -> Iterator[str]:
-    """Parameters that move a switch of a law of time, or of a mode, which is at the start or at the end of a motion."""
-    switching, p = model.switching, model.defaults
-    instants = switching.timeline(p, *span)
-    after, before = instants.sides(span[0])[1], instants.sides(span[1])[0]
-    values = dict(zip((Symbol(name, real=True) for name in model.form.graph.parameters), p.tolist(), strict=True))
-    for time, aside in ((span[0], after - span[0]), (span[1], span[1] - before)):
-        for argument in switching.passed(p, time - aside, time + aside, modes=True) if aside else ():
-            here = {**values, TIME: time}
-            yield from (s.name for s in argument.free_symbols - {TIME} if slope(argument, s).xreplace(here) != 0)
-
-
-def without_start(
-    model: Model, names: Sequence[str], initial: Given, span: tuple[float, float], *, are_asked: bool
-) -> tuple[str, ...]:
-    """The parameters that do not move the start.
-
-    Speeds inside a shaft run straight between those of its ends, which a source or the ratio of a gear may determine.
-
-    Args:
-        model: the compiled network.
-        names: parameters.
-        initial: start values of states.
-        span: start and end of the motion, s.
-        are_asked: whether each of the names must remain.
-
-    Raises:
-        ParameterError: one that is asked for moves the start.
-    """
-    if not initial or not _moved(model, names, initial, span):
-        return tuple(names)
-    moved = {name: states for name in names if (states := _moved(model, (name,), initial, span))}
-    if moved and are_asked:
-        name, states = next(iter(moved.items()))
-        raise ParameterError(
-            f"'{name}' moves the start: {', '.join(states)} follow from it and the start values. Give them start "
-            "values as well."
-        )
-    return tuple(name for name in names if name not in moved)
-
-
-def _moved(model: Model, names: Sequence[str], initial: Given, span: tuple[float, float]) -> tuple[str, ...]:
-    """The states that start elsewhere where some parameters are others."""
-    values = {name: model.parameters[name] for name in names}
-    states, start = _start(model, {}, initial, span)
-    shift = 1e-3  # by which part each parameter is made smaller
-    other = _start(model, {name: value * (1 - shift) for name, value in values.items()}, initial, span)[1]
-    far = np.abs(other - start) > TYPED * shift * np.abs(start).max(initial=0.0)
-    return tuple(name for name, moves in zip(states, far.tolist(), strict=True) if moves)
-
-
-def _start(
-    model: Model, values: Mapping[str, float], initial: Given, span: tuple[float, float]
-) -> tuple[tuple[str, ...], Array]:
-    """The states by name, and where they start, in the equations in which nothing is joined."""
-    if not model.phased:
-        return tuple(model.states), model.state_at_start(model.prepare(model.vector(values)), initial, span)[0]
-    first, p = cast("HybridModel", model).equation_sets.first_equations(values)
-    return tuple(first.model.states), first.model.state_at_start(first.prepared(p), initial, span)[0]

@@ -14,6 +14,7 @@ from shaftwork.studies.work_precision import work_precision
 from shaftwork.studies.work_precision_result import Trial, WorkPrecision
 
 if TYPE_CHECKING:
+    from shaftwork.sensitivities.parametric_motion import TrajectorySensitivities, trajectory_sensitivities
     from shaftwork.sensitivities.sensitivities import frequency_sensitivities, motion_sensitivities
     from shaftwork.sweep.sweep import sweep
     from shaftwork.sweep.sweep_result import Sweep
@@ -23,20 +24,24 @@ __all__ = [
     "Cell",
     "Stability",
     "Sweep",
+    "TrajectorySensitivities",
     "Trial",
     "WorkPrecision",
     "frequency_sensitivities",
     "motion_sensitivities",
     "stability",
     "sweep",
+    "trajectory_sensitivities",
     "work_precision",
 ]
 
 _HOME = {
+    "TrajectorySensitivities": "shaftwork.sensitivities.parametric_motion",
     "Sweep": "shaftwork.sweep.sweep_result",
     "frequency_sensitivities": "shaftwork.sensitivities.sensitivities",
     "motion_sensitivities": "shaftwork.sensitivities.sensitivities",
     "sweep": "shaftwork.sweep.sweep",
+    "trajectory_sensitivities": "shaftwork.sensitivities.parametric_motion",
 }
 
 

@@ -1,0 +1,157 @@
+"""A motion as a function of the parameters of its network, with exact derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shaftwork.codegen.array_form.elements import Array
+from shaftwork.core.errors import ParameterError, SignalError
+from shaftwork.formulation.sampling_instants import refuse_sampled
+from shaftwork.pipeline.arguments import Given, as_names, relative_tolerance
+from shaftwork.pipeline.motion_start import refuse_motion
+from shaftwork.pipeline.network import Network, network_of
+from shaftwork.results.observer import array_in_si
+from shaftwork.sensitivities.differentiation import rows_of
+from shaftwork.sensitivities.legs import DifferentiatedMotion, motion_of
+from shaftwork.sensitivities.motion_slopes import DifferentiatedEquations, MotionSlopes
+from shaftwork.sensitivities.smooth_parameters import smooth_parameters, without_start
+
+
+class ParametricMotion:
+    """A motion for any values of some parameters.
+
+    Args:
+        net: the network.
+        quantities: names of what is read.
+        integrands: name and power of what is integrated over time.
+        parameters: names, "shaft.c"; None for all in which the motion is smooth.
+        span: start and end of the motion, s.
+        initial: start values of states, which do not change with the parameters.
+        rtol: relative tolerance of the derivatives; the motion is computed a hundred times closer.
+
+    Raises:
+        CompileError: there are no symbolic equations for a part of the way.
+        ParameterError: there is no such parameter, or nothing is smooth in it.
+        SignalError: there is no such quantity.
+    """
+
+    def __init__(
+        self,
+        net: Network,
+        quantities: Sequence[str],
+        integrands: Sequence[tuple[str, int]],
+        parameters: Sequence[str] | None,
+        span: tuple[float, float],
+        initial: Given,
+        rtol: float,
+    ) -> None:
+        self.model, self._span, self._initial = network_of(net).compile(), span, initial
+        refuse_sampled(self.model.form, "its derivatives by parameters are not followed from instant to instant")
+        refuse_motion(initial, "motion_sensitivities")
+        self._rtol = relative_tolerance(rtol)
+        states = {state.name for state in self.model.form.states}
+        if unknown := [name for name in initial or {} if name not in states]:
+            raise ParameterError(
+                f"'{unknown[0]}' is no state, so it starts at another state for other parameters. Give start values of "
+                f"states: {', '.join(sorted(states))}."
+            )
+        rows_of(self.model)
+        smooth_parameters(self.model, parameters, (self.model,), span)  # said before the motion is made
+        self.nominal = self.motion({})
+        """The motion for the values of the network."""
+        names = smooth_parameters(self.model, parameters, self.nominal.models, span)
+        names = without_start(self.model, names, initial, span, are_asked=parameters is not None)
+        self.parameters = {name: self.model.parameters[name] for name in names}
+        """Values of the network in SI."""
+        if unknown := [name for name in quantities if name not in self.nominal.solution]:
+            _ = self.nominal.solution[unknown[0]]  # raises, with what there is
+        self._equations = DifferentiatedEquations(names, quantities, integrands)
+
+    def motion(self, values: Mapping[str, float]) -> DifferentiatedMotion:
+        """The motion for other values in SI, which change no structure.
+
+        Raises:
+            SimulationError: it could not be found, or a prescribed speed jumps.
+        """
+        # No engine takes a tolerance below 1e-13.
+        return motion_of(self.model, self._span, self._initial, max(1e-2 * self._rtol, 1e-13), values)
+
+    def slopes(self, motion: DifferentiatedMotion) -> MotionSlopes:
+        """The derivatives of a motion by the parameters.
+
+        Raises:
+            SimulationError: there are none.
+        """
+        values = [motion.values.get(name, value) for name, value in self.parameters.items()]
+        return MotionSlopes(motion, self._equations, np.array(values), self._rtol)
+
+
+@dataclass(frozen=True, eq=False)
+class TrajectorySensitivities:
+    """Quantities over time and their derivatives by parameters.
+
+    Args:
+        name: of the network.
+        parameters: values in SI by name.
+        t: (k,) times, s.
+        values: (k,) by quantity.
+        slopes: (k, parameters) derivatives by quantity, at times that do not change with the parameters.
+    """
+
+    name: str
+    parameters: Mapping[str, float]
+    t: Array
+    values: Mapping[str, Array]
+    slopes: Mapping[str, Array]
+
+    def __getitem__(self, quantity: str) -> dict[str, Array]:
+        """(k,) derivatives of a quantity by each parameter."""
+        return dict(zip(self.parameters, self.slopes[quantity].T, strict=True))
+
+
+def trajectory_sensitivities(
+    net: Network,
+    quantities: str | Sequence[str],
+    t: Sequence[float] | Array,
+    *,
+    parameters: Sequence[str] | None = None,
+    initial: Given = None,
+    rtol: float = 1e-9,
+) -> TrajectorySensitivities:
+    """Quantities of a motion over time, and their exact derivatives by the parameters of the network.
+
+    Law: S' = (df/dx) S + df/dp for S = dx/dp, through changes of modes and switches of laws as in
+    `motion_sensitivities`; of a quantity q(t, x, p), dq/dx S + dq/dp.
+
+    Args:
+        net: the network.
+        quantities: names of speeds, torques or twists, "shaft.tau".
+        t: times in s, ascending; the motion starts at 0.
+        parameters: names, "shaft.c"; by default all in which the motion is smooth.
+        initial: start values of states, which do not change with the parameters.
+        rtol: relative tolerance of the derivatives.
+
+    Raises:
+        CompileError: there are no symbolic equations for a part of the way.
+        ParameterError: there is no such parameter, nothing is smooth in it, or the times do not ascend from zero.
+        SignalError: there is no such quantity.
+        SimulationError: there is no derivative, see `motion_sensitivities`.
+    """
+    times = array_in_si("t", t, "s")
+    if not (times.size and np.isfinite(times).all() and times[0] >= 0.0 and (np.diff(times) >= 0.0).all()):
+        raise ParameterError("t must be times in s that ascend from zero or later, such as np.linspace(0.0, 1.0, 101).")
+    names = as_names(quantities)
+    if not names:
+        raise SignalError("No quantity is named. Give names such as 'shaft.tau'.")
+    motion = ParametricMotion(net, names, (), parameters, (0.0, float(times[-1])), initial, rtol)
+    slopes = motion.slopes(motion.nominal)
+    return TrajectorySensitivities(
+        motion.model.name,
+        motion.parameters,
+        times,
+        {name: slopes.values(name, times) for name in names},
+        {name: slopes.along(name, times) for name in names},
+    )
