@@ -1,0 +1,1 @@
+"""Parameters of a network from records of its motion or of its frequency response."""

@@ -1,0 +1,212 @@
+"""What a network gives for values of its unknowns, beside a record, with the derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shaftwork.codegen.array_form.elements import Array
+from shaftwork.core.errors import CompileError, NetworkError, SimulationError
+from shaftwork.pipeline.model import Model
+from shaftwork.pipeline.network import Network
+from shaftwork.sensitivities.legs import DifferentiatedMotion
+from shaftwork.sensitivities.parametric_motion import ParametricMotion
+
+
+class Source(Protocol):
+    """Values of what is recorded, for values of the parameters in SI."""
+
+    def values(self, parameters: Mapping[str, float]) -> Array:
+        """(N,) computed."""
+        ...
+
+    def slopes(self, parameters: Mapping[str, float]) -> Array | None:
+        """(N, m) derivatives by the parameters; None where they must be had by differences."""
+        ...
+
+
+class Scale:
+    """Parameters as numbers near one: logarithms of those that stay above zero, others by their size.
+
+    Args:
+        start: values in SI by name.
+        positive: (m,) which are taken by their logarithms.
+    """
+
+    def __init__(self, start: Mapping[str, float], positive: NDArray[np.bool_]) -> None:
+        self.names, values = tuple(start), np.array(list(start.values()))
+        self.positive = positive
+        self._sizes = np.where(values == 0.0, 1.0, np.abs(values))
+
+    def unknowns(self, values: Array) -> Array:
+        """(m,) from values in SI."""
+        with np.errstate(divide="ignore"):  # a bound of zero is minus infinity
+            return np.where(self.positive, np.log(np.where(self.positive, values, 1.0)), values / self._sizes)
+
+    def values(self, unknowns: Array) -> Array:
+        """(m,) in SI."""
+        grown = np.exp(np.where(self.positive, unknowns, 0.0))
+        return np.where(self.positive, grown, unknowns * self._sizes)
+
+    def slopes(self, unknowns: Array) -> Array:
+        """(m,) derivatives of the values by the unknowns."""
+        return np.where(self.positive, self.values(unknowns), self._sizes)
+
+
+class ScaledCurves:
+    """A source as a function of scaled unknowns.
+
+    Args:
+        source: what is computed.
+        scale: of the unknowns.
+    """
+
+    def __init__(self, source: Source, scale: Scale) -> None:
+        self._source, self._scale = source, scale
+        self._last: tuple[bytes, Array] = b"", np.empty(0)
+        self.by_differences = False
+        """Whether derivatives had to be had by differences at some values."""
+
+    def _parameters(self, unknowns: Array) -> dict[str, float]:
+        return dict(zip(self._scale.names, self._scale.values(unknowns).tolist(), strict=True))
+
+    def values(self, unknowns: Array) -> Array:
+        """(N,) computed; NaN where there is no motion, so that a shorter step is tried."""
+        if self._last[0] != (key := unknowns.tobytes()):
+            self._last = key, self._computed(unknowns)
+        return self._last[1]
+
+    def _computed(self, unknowns: Array) -> Array:
+        try:
+            return self._source.values(self._parameters(unknowns))
+        except (SimulationError, NetworkError):
+            if not self._last[1].size:
+                raise
+            return np.full_like(self._last[1], np.nan)
+
+    def slopes(self, unknowns: Array) -> Array:
+        """(N, m) derivatives by the unknowns."""
+        try:
+            exact = self._source.slopes(self._parameters(unknowns))
+        except SimulationError:  # something is touched only just, or two changes come together
+            exact = None
+        if exact is not None:
+            return exact * self._scale.slopes(unknowns)
+        self.by_differences = True
+        step = 1e-4  # a motion is known to 1e-9 and more: so its differences are to some 1e-5
+        columns = []
+        for shift in np.eye(unknowns.size) * step:
+            high, low = (self._source.values(self._parameters(unknowns + sign * shift)) for sign in (1.0, -1.0))
+            columns.append((high - low) / (2 * step))
+        return np.array(columns).T
+
+
+class RecordedMotion:
+    """Quantities of a motion at the times of a record.
+
+    Args:
+        net: the network.
+        samples: by quantity, the times (k,) in s at which it was measured.
+        parameters: names.
+        initial: start values of states.
+        rtol: relative tolerance of the derivatives.
+    """
+
+    def __init__(
+        self,
+        net: Network,
+        samples: Mapping[str, Array],
+        parameters: Sequence[str],
+        initial: Mapping[str, float] | None,
+        rtol: float,
+    ) -> None:
+        self._samples, self._parameters = samples, tuple(parameters)
+        self._end = max(float(times[-1]) for times in samples.values())
+        self._motion = ParametricMotion(net, tuple(samples), (), self._parameters, (0.0, self._end), initial, rtol)
+        self._last: tuple[Mapping[str, float], DifferentiatedMotion] = {}, self._motion.nominal
+
+    def _followed(self, parameters: Mapping[str, float]) -> DifferentiatedMotion:
+        if self._last[0] != parameters:
+            self._last = parameters, self._motion.motion(parameters)
+        return self._last[1]
+
+    def values(self, parameters: Mapping[str, float]) -> Array:
+        """(N,) computed."""
+        solution = self._followed(parameters).solution
+        return np.concatenate([solution.at(times)[name] for name, times in self._samples.items()])
+
+    def slopes(self, parameters: Mapping[str, float]) -> Array:
+        """(N, m) derivatives by the parameters."""
+        slopes = self._motion.slopes(self._followed(parameters))
+        return np.vstack([slopes.along(name, times) for name, times in self._samples.items()])
+
+
+class SimulatedMotion:
+    """The same by simulation alone, where equations are not symbolic or controllers sample.
+
+    Args:
+        model: the compiled network.
+        samples: by quantity, the times (k,) in s at which it was measured.
+        initial: start values.
+        rtol: relative tolerance.
+    """
+
+    def __init__(
+        self, model: Model, samples: Mapping[str, Array], initial: Mapping[str, float] | None, rtol: float
+    ) -> None:
+        self._model, self._samples, self._initial, self._rtol = model, samples, initial, rtol
+        self._end = max(float(times[-1]) for times in samples.values())
+
+    def values(self, parameters: Mapping[str, float]) -> Array:
+        """(N,) computed."""
+        motion = self._model.simulate(
+            self._end, initial=self._initial, parameters=parameters, rtol=self._rtol, t_eval="steps"
+        )
+        return np.concatenate([motion.at(times)[name] for name, times in self._samples.items()])
+
+    def slopes(self, parameters: Mapping[str, float]) -> None:  # noqa: ARG002 (by differences)
+        """None: by differences."""
+        return
+
+
+class RecordedResponse:
+    """Frequency responses at the frequencies of a record, real parts before imaginary ones.
+
+    Args:
+        model: the compiled network.
+        samples: by output and input, the frequencies (k,) in Hz.
+        at: the point about which the network swings.
+    """
+
+    def __init__(self, model: Model, samples: Mapping[tuple[str, str], Array], at: Mapping[str, float] | None) -> None:
+        self._model, self._samples, self._at = model, samples, at
+
+    def values(self, parameters: Mapping[str, float]) -> Array:
+        """(N,) computed."""
+        parts: list[Array] = []
+        for (output, source), f in self._samples.items():
+            linear = self._model.linearize(self._at, inputs=[source], outputs=[output], parameters=parameters)
+            response = linear.frequency_response(source, output, f).values
+            parts += [np.asarray(response.real), np.asarray(response.imag)]
+        return np.concatenate(parts)
+
+    def slopes(self, parameters: Mapping[str, float]) -> None:  # noqa: ARG002 (by differences)
+        """None: by differences."""
+        return
+
+
+def recorded_motion(
+    net: Network,
+    samples: Mapping[str, Array],
+    parameters: Sequence[str],
+    initial: Mapping[str, float] | None,
+    rtol: float,
+) -> Source:
+    """The motion with exact derivatives, or without where there are none."""
+    try:
+        return RecordedMotion(net, samples, parameters, initial, rtol)
+    except (CompileError, SimulationError):  # too large for symbols, or sampled
+        return SimulatedMotion(net.compile(), samples, initial, 1e-2 * rtol)

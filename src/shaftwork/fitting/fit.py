@@ -1,0 +1,255 @@
+"""Parameters of a network from what was measured of it."""
+
+from __future__ import annotations
+
+import math
+import reprlib
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from shaftwork.codegen.array_form.elements import Array
+from shaftwork.core.errors import ParameterError
+from shaftwork.core.parameters import Parameter, is_quantity
+from shaftwork.fitting.curves import RecordedResponse, Scale, ScaledCurves, Source, recorded_motion
+from shaftwork.fitting.estimation import LOSSES, Data, estimate
+from shaftwork.fitting.fit_result import Fit
+from shaftwork.network.netlist import Netlist
+from shaftwork.pipeline.arguments import checked_parameter, relative_tolerance, repeated
+from shaftwork.pipeline.motion_start import refuse_motion
+from shaftwork.pipeline.network import Network, network_of
+from shaftwork.results.observer import array_in_si
+
+Range = tuple[float | None, float | None]
+
+
+class _Series(NamedTuple):
+    """One recorded quantity.
+
+    Args:
+        at: (k,) times in s, or frequencies in Hz.
+        measured: (k,) values, or (2 k,) real parts before imaginary ones.
+    """
+
+    at: Array
+    measured: Array
+
+
+def fit(
+    net: Network,
+    record: Mapping[str, Any],
+    unknowns: Sequence[str] | Mapping[str, Range | None],
+    *,
+    sigma: float | Mapping[str, float] | None = None,
+    priors: Mapping[str, tuple[float, float]] | None = None,
+    loss: str = "linear",
+    initial: Mapping[str, float] | None = None,
+    at: Mapping[str, float] | None = None,
+    rtol: float = 1e-6,
+) -> Fit:
+    """Find parameters of a network from a record of its motion, or of its frequency response.
+
+    Law: least squares of what is computed less what is measured, each in standard deviations of its noise, with the
+    derivatives of `studies.trajectory_sensitivities`, exact through all events; where there are none (frequency
+    responses, sampled controllers, more than some hundred states) central differences. A parameter that must stay
+    above zero is fitted by its logarithm.
+
+    The intervals hold for a model that is right, and for noise that is white: then the `correlation` of neighbouring
+    residuals is near zero. Where it is not, something is missing in the model, or samples are closer than the noise
+    changes; then true intervals are wider.
+
+    Args:
+        net: the network; its values are the start.
+        record: {"t": times in s, "shaft.tau": values, ...}, also a pandas data frame; NaN is no value. Times count from
+            the start of the motion. Or {"f": frequencies in Hz, "shaft.tau / motor.tau": complex values}, output over
+            input. SI, or pint quantities.
+        unknowns: names, ["shaft.c", "shaft.d"], or by name (low, high), None leaves a side open.
+        sigma: standard deviation of the noise in SI, one or by quantity; by default it is estimated from the record.
+        priors: by name (value, standard deviation), what is known of an unknown without the record.
+        loss: "linear", or for records with outliers "soft_l1", "huber" or "cauchy", see scipy's `least_squares`.
+        initial: start values of states, which do not change with the unknowns.
+        at: for a frequency response the point about which the network swings, as for `Model.linearize`.
+        rtol: relative tolerance of the derivatives; motions are computed a hundred times closer.
+
+    Raises:
+        ParameterError: there is no such parameter, nothing is smooth in it, or an argument is out of its range.
+        SignalError: there is no such quantity.
+        SimulationError: the motion at the start cannot be computed.
+    """
+    netlist = network_of(net).netlist()
+    refuse_motion(initial, "fit")
+    model = net.compile()
+    ranges = _ranges(netlist, model.parameters, unknowns)
+    start = {name: model.parameters[name] for name in ranges}
+    declared = [_declared(netlist, name) for name in ranges]
+    ends = [_ends(parameter, span) for parameter, span in zip(declared, ranges.values(), strict=True)]
+    scale = Scale(start, np.array([value > 0 <= low for value, (low, _) in zip(start.values(), ends, strict=True)]))
+    _refuse_outside(start, ends)
+    domain, series = _series(record)
+    samples = {name: one.at for name, one in series.items()}
+    source: Source
+    if domain == "t":
+        source = recorded_motion(net, samples, tuple(ranges), initial, relative_tolerance(rtol))
+    else:
+        source = RecordedResponse(model, {_pair(name): f for name, f in samples.items()}, at)
+    data = Data(
+        np.concatenate([one.measured for one in series.values()]),
+        np.repeat(np.arange(len(series)), [one.measured.size for one in series.values()]),
+        _deviations(sigma, tuple(series)),
+        *_priors(priors, scale),
+        _checked_loss(loss),
+    )
+    if data.measured.size < len(ranges):
+        raise ParameterError(
+            f"The record has {data.measured.size} values for {len(ranges)} unknowns. Give more, or fewer unknowns."
+        )
+    low, high = (scale.unknowns(np.array(side)) for side in zip(*ends, strict=True))
+    curves = ScaledCurves(source, scale)
+    estimated = estimate(curves, data, scale.unknowns(np.array(list(start.values()))), (low, high))
+    return Fit(
+        network=net,
+        units={name: parameter.unit for name, parameter in zip(ranges, declared, strict=True)},
+        start=start,
+        scale=scale,
+        samples=samples,
+        data=data,
+        estimate=estimated,
+        domain=domain,
+        initial=dict(initial or {}),
+        by_differences=curves.by_differences,
+    )
+
+
+def _ranges(netlist: Netlist, parameters: Mapping[str, float], unknowns: Any) -> dict[str, Range]:
+    """Low and high by name, in SI.
+
+    Raises:
+        ParameterError: there is no such parameter, it is named twice, or a range is none.
+    """
+    listed = [unknowns] if isinstance(unknowns, str) else list(unknowns)
+    if not listed:
+        raise ParameterError("Nothing is unknown. Name what to fit, such as ['shaft.c', 'shaft.d'].")
+    if twice := repeated(map(str, listed)):
+        raise ParameterError(f"'{twice}' is named twice. Name each unknown once.")
+    ranges: dict[str, Range] = {}
+    for name in listed:
+        span = unknowns[name] if isinstance(unknowns, Mapping) else None
+        if not (span is None or (isinstance(span, Sequence) and not isinstance(span, str) and len(span) == 2)):
+            raise ParameterError(f"'{name}': {span!r} is no range. Give (low, high); None leaves a side open.")
+        low, high = (None if end is None else checked_parameter(netlist, name, end) for end in span or (None, None))
+        if low is not None and high is not None and low >= high:
+            raise ParameterError(f"'{name}': ({low:g}, {high:g}) is no range. The first must be less than the second.")
+        checked_parameter(netlist, name, parameters.get(name))
+        ranges[name] = (low, high)
+    return ranges
+
+
+def _declared(netlist: Netlist, name: str) -> Parameter:
+    owner, _, parameter = name.rpartition(".")
+    return next(placed.part.declared[parameter] for placed in netlist.placed if placed.part.name == owner)
+
+
+def _ends(parameter: Parameter, span: Range) -> tuple[float, float]:
+    """Low and high: those that are given, or else those of every part of the kind."""
+    lows = [end for end in (span[0], parameter.above, parameter.at_least) if end is not None]
+    highs = [end for end in (span[1], parameter.at_most) if end is not None]
+    return max(lows, default=-np.inf), min(highs, default=np.inf)
+
+
+def _refuse_outside(start: Mapping[str, float], ends: Sequence[tuple[float, float]]) -> None:
+    for (name, value), (low, high) in zip(start.items(), ends, strict=True):
+        if not low < value < high:
+            raise ParameterError(
+                f"'{name}' = {value:g} is where the fit starts, and must lie between {low:g} and {high:g}. Give the "
+                "network another value, or another range."
+            )
+
+
+def _series(record: Any) -> tuple[str, dict[str, _Series]]:
+    """Whether over times "t" or frequencies "f", and what is recorded there, in ascending order.
+
+    Raises:
+        ParameterError: there is neither or both, a column has another length, or no value.
+    """
+    if not hasattr(record, "items"):
+        raise ParameterError(f"{reprlib.repr(record)} is no record. Give {{'t': times, 'shaft.tau': values}}.")
+    columns = {str(name): values for name, values in record.items()}
+    domains = [name for name in ("t", "f") if name in columns]
+    if len(domains) != 1 or len(columns) < 2:
+        raise ParameterError(
+            "A record has a column 't' of times in s or 'f' of frequencies in Hz, and beside it what was measured. "
+            f"There are: {', '.join(columns) or 'none'}."
+        )
+    domain = domains[0]
+    at = array_in_si(domain, _plain(columns.pop(domain)), {"t": "s", "f": "Hz"}[domain])
+    if not (at.size and np.isfinite(at).all() and at.min() >= 0.0):
+        raise ParameterError(f"'{domain}' must be numbers from zero on. A motion starts at t = 0 s.")
+    order = np.argsort(at, kind="stable")
+    series = {}
+    for name, column in columns.items():
+        if is_quantity(column):
+            raise ParameterError(f"'{name}' has a unit. Give plain numbers in SI.")
+        values = np.asarray(_plain(column))
+        if values.shape != at.shape:
+            raise ParameterError(
+                f"'{name}' has {values.shape} values, and '{domain}' {at.shape}. They must be as many."
+            )
+        ordered = values[order].astype(float if domain == "t" else complex)
+        there = np.isfinite(ordered)
+        if not there.any():
+            raise ParameterError(f"'{name}' has no finite value.")
+        parts = [ordered] if domain == "t" else [ordered.real, ordered.imag]
+        series[name] = _Series(at[order][there], np.concatenate([part[there] for part in parts]))
+    return domain, series
+
+
+def _plain(values: Any) -> Any:
+    """A column of a data frame as an array."""
+    return values.to_numpy() if hasattr(values, "to_numpy") else values
+
+
+def _pair(name: str) -> tuple[str, str]:
+    """Output and input of a frequency response."""
+    output, slash, source = name.partition("/")
+    if not (slash and output.strip() and source.strip()):
+        raise ParameterError(f"'{name}' is no response. Write output over input, 'shaft.tau / motor.tau'.")
+    return output.strip(), source.strip()
+
+
+def _deviations(sigma: Any, names: Sequence[str]) -> Array | None:
+    """(series,) standard deviations of the noise, or None."""
+    if sigma is None:
+        return None
+    if isinstance(sigma, Mapping) and (missing := [name for name in names if name not in sigma]):
+        raise ParameterError(
+            f"sigma has no value for '{missing[0]}'. Give one for each quantity of the record, or none."
+        )
+    values = [sigma[name] if isinstance(sigma, Mapping) else sigma for name in names]
+    deviations = np.array(values, dtype=float)
+    if not (np.isfinite(deviations).all() and (deviations > 0).all()):
+        raise ParameterError(f"sigma = {sigma!r} must be positive: the standard deviation of the noise, in SI.")
+    return deviations
+
+
+def _priors(priors: Mapping[str, tuple[float, float]] | None, scale: Scale) -> tuple[Array, Array]:
+    """(m,) values expected of the scaled unknowns, and their standard deviations; NaN where nothing is."""
+    values, deviations = np.full((2, len(scale.names)), np.nan)
+    for name, (value, deviation) in (priors or {}).items():
+        if name not in scale.names:
+            raise ParameterError(f"'{name}' has a prior and is not unknown. Unknown are: {', '.join(scale.names)}.")
+        place = scale.names.index(name)
+        if not (math.isfinite(value) and 0 < deviation < math.inf and (value > 0 or not scale.positive[place])):
+            raise ParameterError(
+                f"The prior of '{name}' must be (value, standard deviation), not ({value}, {deviation})."
+            )
+        values[place], deviations[place] = value, deviation
+    there = ~np.isnan(values)
+    scaled = scale.unknowns(np.where(there, values, 1.0))
+    return np.where(there, scaled, np.nan), deviations / scale.slopes(scaled)
+
+
+def _checked_loss(loss: str) -> str:
+    if loss not in LOSSES:
+        raise ParameterError(f"There is no loss {loss!r}. Take one of: {', '.join(LOSSES)}.")
+    return loss

@@ -1,0 +1,197 @@
+"""What a fit has found: values with their intervals, what the record cannot tell, residuals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import stats
+
+from shaftwork.codegen.array_form.elements import Array
+from shaftwork.core.notebook import html_table
+from shaftwork.fitting.curves import Scale
+from shaftwork.fitting.estimation import Data, Estimate
+from shaftwork.pipeline.network import Network, with_values
+from shaftwork.results.plotting import new_figure, plain
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Parameters of a network that fit a record.
+
+    Args:
+        network: that the fit began with.
+        units: of the unknowns by name.
+        start: values of the unknowns in the network.
+        scale: of the unknowns.
+        samples: by quantity, times (k,) in s or frequencies in Hz.
+        data: what was measured.
+        estimate: what was found, in scaled unknowns.
+        domain: "t" or "f".
+        initial: start values of states.
+        by_differences: whether some derivatives had to be had by differences.
+    """
+
+    network: Network
+    units: Mapping[str, str]
+    start: Mapping[str, float]
+    scale: Scale
+    samples: Mapping[str, Array]
+    data: Data
+    estimate: Estimate
+    domain: str
+    initial: Mapping[str, float]
+    by_differences: bool
+
+    @cached_property
+    def values(self) -> dict[str, float]:
+        """The fitted parameters in SI, to be given as `parameters` to `Model.simulate`."""
+        return dict(zip(self.scale.names, self.scale.values(self.estimate.unknowns).tolist(), strict=True))
+
+    @property
+    def fitted(self) -> Network:
+        """The network with the fitted parameters."""
+        return with_values(self.network, self.values)
+
+    @property
+    def noise(self) -> dict[str, float]:
+        """Standard deviations of the noise by quantity, in SI."""
+        return dict(zip(self.samples, self.estimate.deviations.tolist(), strict=True))
+
+    @property
+    def deviations(self) -> dict[str, float]:
+        """Standard deviations of the parameters in SI; infinite where the record tells nothing, NaN at a bound."""
+        slopes = self.scale.slopes(self.estimate.unknowns)
+        sizes = np.sqrt(np.diag(self.estimate.covariance)) * slopes
+        return dict(zip(self.scale.names, sizes.tolist(), strict=True))
+
+    def intervals(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
+        """Confidence intervals by parameter, in SI.
+
+        Law: t-quantiles of the scaled unknowns, of a normal distribution where `sigma` was given. So the interval of a
+        parameter that stays above zero does as well.
+
+        Args:
+            level: the share of records whose interval holds the true value.
+        """
+        freedom = self.data.measured.size - len(self.scale.names)
+        quantile = (1 + level) / 2
+        width = stats.norm.ppf(quantile) if self.data.deviations is not None else stats.t.ppf(quantile, max(freedom, 1))
+        reach = width * np.sqrt(np.diag(self.estimate.covariance))
+        with np.errstate(over="ignore"):  # of what is not known at all
+            low, high = (self.scale.values(self.estimate.unknowns + sign * reach) for sign in (-1.0, 1.0))
+        return dict(zip(self.scale.names, zip(low.tolist(), high.tolist(), strict=True), strict=True))
+
+    @property
+    def correlations(self) -> Array:
+        """(m, m) of the fitted parameters: near one or minus one where the record tells them apart hardly."""
+        sizes = np.sqrt(np.diag(self.estimate.covariance))
+        with np.errstate(invalid="ignore"):
+            return np.asarray(self.estimate.covariance / np.outer(sizes, sizes))
+
+    @property
+    def unseen(self) -> tuple[tuple[float, dict[str, float]], ...]:
+        """Combinations that the record cannot tell: how far each is known, as a part of its size, and its shares.
+
+        A combination is a relative change of several parameters at once. One counts as unseen where its standard
+        deviation is more than its size.
+        """
+        pairs = zip(self.estimate.spreads.tolist(), self.estimate.directions, strict=True)
+        return tuple(
+            (
+                spread,
+                {name: share for name, share in zip(self.scale.names, row.tolist(), strict=True) if abs(share) > 0.1},
+            )
+            for spread, row in pairs
+            if spread > 1.0
+        )
+
+    @cached_property
+    def residuals(self) -> dict[str, Array]:
+        """(k,) by quantity, computed less measured; of a response complex."""
+        parts = {name: self.estimate.residuals[self.data.series == number] for number, name in enumerate(self.samples)}
+        if self.domain == "t":
+            return parts
+        return {name: values[: len(values) // 2] + 1j * values[len(values) // 2 :] for name, values in parts.items()}
+
+    @property
+    def correlation(self) -> dict[str, float]:
+        """Of neighbouring residuals by quantity: within 2 / sqrt(k) of zero where what is left is white noise."""
+        found = {}
+        for name, values in self.residuals.items():
+            power = float((np.abs(values) ** 2).sum())
+            found[name] = float((values[1:] * values[:-1].conj()).sum().real) / power if power else 0.0
+        return found
+
+    @property
+    def measured(self) -> dict[str, Array]:
+        """(k,) by quantity, as recorded."""
+        parts = {name: self.data.measured[self.data.series == number] for number, name in enumerate(self.samples)}
+        if self.domain == "t":
+            return parts
+        return {name: values[: len(values) // 2] + 1j * values[len(values) // 2 :] for name, values in parts.items()}
+
+    def plot(self) -> Figure:
+        """What was measured and computed, and below it the residuals (extra `plot`).
+
+        Raises:
+            MissingExtraError: matplotlib is not installed.
+        """
+        count = len(self.samples)
+        figure = new_figure("Fit.plot()", 9.0, 1.2 + 3.4 * count, str(self).partition("\n")[0])
+        rows = figure.subplots(2 * count, 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": [2, 1] * count})
+        for number, (name, at) in enumerate(self.samples.items()):
+            curve, rest = rows[2 * number, 0], rows[2 * number + 1, 0]
+            measured, residuals = self.measured[name], self.residuals[name]
+            shown = np.abs if self.domain == "f" else np.asarray
+            curve.plot(at, shown(measured), ".", color="0.6", markersize=3, label="measured")
+            curve.plot(at, shown(measured + residuals), color="tab:blue", linewidth=1, label="fitted")
+            curve.set_ylabel(plain(name))
+            curve.legend(loc="best", fontsize=8)
+            rest.plot(at, shown(residuals), ".", color="tab:red", markersize=2)
+            rest.axhline(0.0, color="0.3", linewidth=0.6)
+            rest.set_ylabel("residual")
+        rows[-1, 0].set_xlabel("t in s" if self.domain == "t" else "f in Hz")
+        return figure
+
+    def _rows(self) -> tuple[str, list[str], list[list[str]], list[str]]:
+        """Title, headings, rows and notes."""
+        names, level = ", ".join(self.samples), 0.95
+        title = f"{self.network.name}: {len(self.values)} parameters from {self.data.measured.size} values of {names}"
+        rows = [
+            [name, f"{value:.6g}", f"{low:.6g}", f"{high:.6g}", f"{self.start[name]:.6g}", self.units[name]]
+            for (name, value), (low, high) in zip(self.values.items(), self.intervals(level).values(), strict=True)
+        ]
+        notes = [
+            f"{name}: noise {noise:.3g}, correlation of neighbours {self.correlation[name]:.2f}"
+            for name, noise in self.noise.items()
+        ]
+        for spread, shares in self.unseen:
+            words = ", ".join(f"{name} {share:+.2f}" for name, share in shares.items())
+            known = "not at all" if np.isinf(spread) else f"to {100 * spread:.0f} % only"
+            notes.append(f"The record tells this combination {known}: {words}.")
+        held = [name for name, ends in zip(self.scale.names, self.estimate.at_bounds.tolist(), strict=True) if ends]
+        if held:
+            notes.append(f"At a bound, and without an interval: {', '.join(held)}.")
+        return title, ["", "fitted", "95 % from", "to", "start", "unit"], rows, notes
+
+    def __str__(self) -> str:
+        title, header, rows, notes = self._rows()
+        widths = [max(len(row[column]) for row in [header, *rows]) for column in range(len(header))]
+        lines = [
+            f"{row[0]:{widths[0]}}  "
+            + "  ".join(f"{cell:>{width}}" for cell, width in zip(row[1:-1], widths[1:-1], strict=True))
+            + f"  {row[-1]}"
+            for row in [header, *rows]
+        ]
+        return "\n".join([title, *lines, *notes])
+
+    def _repr_html_(self) -> str:
+        title, header, rows, notes = self._rows()
+        return html_table(title, header, rows, " ".join(notes))
