@@ -108,6 +108,8 @@ if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
         ModelicaModel as ModelicaModel,
         read_modelica as read_modelica,
     )
+    from shaftwork.fitting.fit import fit as fit
+    from shaftwork.fitting.fit_result import Fit as Fit
     from shaftwork.fmu.fmu_parts import FMUSpeed as FMUSpeed, FMUTorque as FMUTorque
     from shaftwork.fmu.foreign_unit import FMU as FMU
     from shaftwork.pipeline.model import Model as Model
@@ -178,6 +180,8 @@ _HOME = {
     "shaftwork.results.fatigue": ("SNLine",),
     "shaftwork.results.solution": ("Solution",),
     "shaftwork.torsional.calculation": ("torsional_calculation",),
+    "shaftwork.fitting.fit": ("fit",),
+    "shaftwork.fitting.fit_result": ("Fit",),
 }
 _PACKAGES = ("live", "reduce", "scenes", "sizing", "spice", "studies", "torsional")
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}

@@ -33,6 +33,7 @@ USES = {
     "spectra": "net.simulate(0.1).spectrum('shaft.tau')",
     "reporting": "sw.report(net, sections=['parts'])",
     "torsional": "sw.torsional.Section",
+    "fitting": "sw.fit(net, {'t': [0.1, 0.2], 'J2.omega': [0.1, 0.2]}, ['shaft.c'])",
     "live": "sw.live.Session(net, t_end=0.1)",
     "stepper": "net.compile().start().step(0.1)",
     "motionfiles": "net.simulate(0.1).save(folder / 'motion.nc')",
@@ -47,6 +48,7 @@ NEEDS = {
     "reporting": ("latex", "drawing", "modelfiles"),
     "live": ("reporting", "latex", "drawing", "modelfiles", "frequency", "animation"),
     "fmu": ("ccode",),
+    "fitting": ("sensitivities",),
 }
 """By feature, those that it is made of."""
 
@@ -56,6 +58,7 @@ JOINS = {
     "drawing": ("shaftwork.reporting", "shaftwork.live"),
     "modelfiles": ("shaftwork.reporting", "shaftwork.live", "shaftwork.motionfiles"),
     "reporting": ("shaftwork.live",),
+    "sensitivities": ("shaftwork.fitting",),
     "frequency": ("shaftwork.live", "shaftwork.torsional.forced_train"),
     "hybrid": (
         "shaftwork.waves.hybrid_wave_model",

@@ -110,7 +110,7 @@ class RecordedMotion:
     Args:
         net: the network.
         samples: by quantity, the times (k,) in s at which it was measured.
-        parameters: names.
+        parameters: names of parameters and of states whose start values are unknown.
         initial: start values of states.
         rtol: relative tolerance of the derivatives.
     """
@@ -123,9 +123,11 @@ class RecordedMotion:
         initial: Mapping[str, float] | None,
         rtol: float,
     ) -> None:
-        self._samples, self._parameters = samples, tuple(parameters)
-        self._end = max(float(times[-1]) for times in samples.values())
-        self._motion = ParametricMotion(net, tuple(samples), (), self._parameters, (0.0, self._end), initial, rtol)
+        self._samples, span = samples, (0.0, last_of(samples))
+        starts = tuple(name for name in parameters if name not in net.compile().parameters)
+        names = tuple(name for name in parameters if name not in starts)
+        self._motion = ParametricMotion(net, tuple(samples), (), names, span, initial, rtol, starts)
+        self._order = [list(self._motion.parameters).index(name) for name in parameters]
         self._last: tuple[Mapping[str, float], DifferentiatedMotion] = {}, self._motion.nominal
 
     def _followed(self, parameters: Mapping[str, float]) -> DifferentiatedMotion:
@@ -140,8 +142,8 @@ class RecordedMotion:
 
     def slopes(self, parameters: Mapping[str, float]) -> Array:
         """(N, m) derivatives by the parameters."""
-        slopes = self._motion.slopes(self._followed(parameters))
-        return np.vstack([slopes.along(name, times) for name, times in self._samples.items()])
+        slopes = self._motion.slopes(self._followed(parameters), parameters)
+        return np.vstack([slopes.along(name, times) for name, times in self._samples.items()])[:, self._order]
 
 
 class SimulatedMotion:
@@ -157,13 +159,15 @@ class SimulatedMotion:
     def __init__(
         self, model: Model, samples: Mapping[str, Array], initial: Mapping[str, float] | None, rtol: float
     ) -> None:
-        self._model, self._samples, self._initial, self._rtol = model, samples, initial, rtol
-        self._end = max(float(times[-1]) for times in samples.values())
+        self._model, self._samples, self._initial, self._rtol = model, samples, initial or {}, rtol
+        self._end = last_of(samples)
 
     def values(self, parameters: Mapping[str, float]) -> Array:
         """(N,) computed."""
+        starts = {name: value for name, value in parameters.items() if name not in self._model.parameters}
+        values = {name: value for name, value in parameters.items() if name not in starts}
         motion = self._model.simulate(
-            self._end, initial=self._initial, parameters=parameters, rtol=self._rtol, t_eval="steps"
+            self._end, initial={**self._initial, **starts}, parameters=values, rtol=self._rtol, t_eval="steps"
         )
         return np.concatenate([motion.at(times)[name] for name, times in self._samples.items()])
 
@@ -196,6 +200,11 @@ class RecordedResponse:
     def slopes(self, parameters: Mapping[str, float]) -> None:  # noqa: ARG002 (by differences)
         """None: by differences."""
         return
+
+
+def last_of(samples: Mapping[str, Array]) -> float:
+    """The last of all times, s."""
+    return max(float(times[-1]) for times in samples.values())
 
 
 def recorded_motion(

@@ -14,9 +14,10 @@ from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import Parameter, is_quantity
 from shaftwork.fitting.curves import RecordedResponse, Scale, ScaledCurves, Source, recorded_motion
 from shaftwork.fitting.estimation import LOSSES, Data, estimate
-from shaftwork.fitting.fit_result import Fit
+from shaftwork.fitting.fit_result import AT_START, Fit
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import checked_parameter, relative_tolerance, repeated
+from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import refuse_motion
 from shaftwork.pipeline.network import Network, network_of
 from shaftwork.results.observer import array_in_si
@@ -64,11 +65,12 @@ def fit(
         record: {"t": times in s, "shaft.tau": values, ...}, also a pandas data frame; NaN is no value. Times count from
             the start of the motion. Or {"f": frequencies in Hz, "shaft.tau / motor.tau": complex values}, output over
             input. SI, or pint quantities.
-        unknowns: names, ["shaft.c", "shaft.d"], or by name (low, high), None leaves a side open.
+        unknowns: names, ["shaft.c", "shaft.d"], also of states whose start values are unknown, "J1.omega"; or by name
+            (low, high), None leaves a side open.
         sigma: standard deviation of the noise in SI, one or by quantity; by default it is estimated from the record.
         priors: by name (value, standard deviation), what is known of an unknown without the record.
         loss: "linear", or for records with outliers "soft_l1", "huber" or "cauchy", see scipy's `least_squares`.
-        initial: start values of states, which do not change with the unknowns.
+        initial: start values of states, from which unknown ones start.
         at: for a frequency response the point about which the network swings, as for `Model.linearize`.
         rtol: relative tolerance of the derivatives; motions are computed a hundred times closer.
 
@@ -80,9 +82,9 @@ def fit(
     netlist = network_of(net).netlist()
     refuse_motion(initial, "fit")
     model = net.compile()
-    ranges = _ranges(netlist, model.parameters, unknowns)
-    start = {name: model.parameters[name] for name in ranges}
-    declared = [_declared(netlist, name) for name in ranges]
+    ranges = _ranges(netlist, model, unknowns)
+    start = {name: model.parameters.get(name, (initial or {}).get(name, 0.0)) for name in ranges}
+    declared = [_declared(netlist, name) if name in model.parameters else None for name in ranges]
     ends = [_ends(parameter, span) for parameter, span in zip(declared, ranges.values(), strict=True)]
     scale = Scale(start, np.array([value > 0 <= low for value, (low, _) in zip(start.values(), ends, strict=True)]))
     _refuse_outside(start, ends)
@@ -109,7 +111,9 @@ def fit(
     estimated = estimate(curves, data, scale.unknowns(np.array(list(start.values()))), (low, high))
     return Fit(
         network=net,
-        units={name: parameter.unit for name, parameter in zip(ranges, declared, strict=True)},
+        units={
+            name: parameter.unit if parameter else AT_START for name, parameter in zip(ranges, declared, strict=True)
+        },
         start=start,
         scale=scale,
         samples=samples,
@@ -121,7 +125,7 @@ def fit(
     )
 
 
-def _ranges(netlist: Netlist, parameters: Mapping[str, float], unknowns: Any) -> dict[str, Range]:
+def _ranges(netlist: Netlist, model: Model, unknowns: Any) -> dict[str, Range]:
     """Low and high by name, in SI.
 
     Raises:
@@ -137,10 +141,15 @@ def _ranges(netlist: Netlist, parameters: Mapping[str, float], unknowns: Any) ->
         span = unknowns[name] if isinstance(unknowns, Mapping) else None
         if not (span is None or (isinstance(span, Sequence) and not isinstance(span, str) and len(span) == 2)):
             raise ParameterError(f"'{name}': {span!r} is no range. Give (low, high); None leaves a side open.")
-        low, high = (None if end is None else checked_parameter(netlist, name, end) for end in span or (None, None))
+        is_start = name in {state.name for state in model.form.states}
+        if not is_start:
+            checked_parameter(netlist, name, model.parameters.get(name))  # says which there are
+        ends = [None if end is None else float(end) for end in span or (None, None)]
+        low, high = (
+            ends if is_start else [end if end is None else checked_parameter(netlist, name, end) for end in ends]
+        )
         if low is not None and high is not None and low >= high:
             raise ParameterError(f"'{name}': ({low:g}, {high:g}) is no range. The first must be less than the second.")
-        checked_parameter(netlist, name, parameters.get(name))
         ranges[name] = (low, high)
     return ranges
 
@@ -150,10 +159,11 @@ def _declared(netlist: Netlist, name: str) -> Parameter:
     return next(placed.part.declared[parameter] for placed in netlist.placed if placed.part.name == owner)
 
 
-def _ends(parameter: Parameter, span: Range) -> tuple[float, float]:
-    """Low and high: those that are given, or else those of every part of the kind."""
-    lows = [end for end in (span[0], parameter.above, parameter.at_least) if end is not None]
-    highs = [end for end in (span[1], parameter.at_most) if end is not None]
+def _ends(parameter: Parameter | None, span: Range) -> tuple[float, float]:
+    """Low and high: those that are given, and those of every part of the kind."""
+    declared = (parameter.above, parameter.at_least) if parameter else ()
+    lows = [end for end in (span[0], *declared) if end is not None]
+    highs = [end for end in (span[1], parameter.at_most if parameter else None) if end is not None]
     return max(lows, default=-np.inf), min(highs, default=np.inf)
 
 

@@ -21,13 +21,17 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+AT_START = "at t = 0"
+"""In place of the unit of an unknown start value."""
+
+
 @dataclass(frozen=True, eq=False)
 class Fit:
     """Parameters of a network that fit a record.
 
     Args:
         network: that the fit began with.
-        units: of the unknowns by name.
+        units: of the unknowns by name; `AT_START` of start values.
         start: values of the unknowns in the network.
         scale: of the unknowns.
         samples: by quantity, times (k,) in s or frequencies in Hz.
@@ -51,13 +55,23 @@ class Fit:
 
     @cached_property
     def values(self) -> dict[str, float]:
-        """The fitted parameters in SI, to be given as `parameters` to `Model.simulate`."""
+        """All that was fitted, in SI."""
         return dict(zip(self.scale.names, self.scale.values(self.estimate.unknowns).tolist(), strict=True))
 
     @property
+    def parameters(self) -> dict[str, float]:
+        """The fitted parameters, for `Model.simulate(parameters=...)`."""
+        return {name: value for name, value in self.values.items() if self.units[name] != AT_START}
+
+    @property
+    def starts(self) -> dict[str, float]:
+        """The start values, fitted ones among them, for `Model.simulate(initial=...)`."""
+        return {**self.initial, **{name: value for name, value in self.values.items() if self.units[name] == AT_START}}
+
+    @property
     def fitted(self) -> Network:
-        """The network with the fitted parameters."""
-        return with_values(self.network, self.values)
+        """The network with the fitted parameters; start values are no part of it."""
+        return with_values(self.network, self.parameters)
 
     @property
     def noise(self) -> dict[str, float]:

@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from sympy import Expr, Symbol
+from sympy import Dummy, Expr, Symbol
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import AccuracyWarning, ParameterError, SimulationError
@@ -30,16 +30,23 @@ class DifferentiatedEquations:
     """The equations of every model with their derivatives by parameters, each made once.
 
     Args:
-        parameters: names of m of them.
+        parameters: names of parameters, which come first among the m.
+        starts: names of states whose start values are the rest of the m.
         quantities: names of what is read.
         integrands: name and power of what is integrated over time.
     """
 
     def __init__(
-        self, parameters: Sequence[str], quantities: Sequence[str], integrands: Sequence[tuple[str, int]] = ()
+        self,
+        parameters: Sequence[str],
+        starts: Sequence[str],
+        quantities: Sequence[str],
+        integrands: Sequence[tuple[str, int]],
     ) -> None:
-        self.parameters, self._quantities, self._integrands = tuple(parameters), tuple(quantities), tuple(integrands)
-        self._symbols = tuple(Symbol(name, real=True) for name in parameters)
+        self.columns, self._quantities, self._integrands = (*parameters, *starts), tuple(quantities), tuple(integrands)
+        # a start value stands in no equation, only its state does
+        self._symbols = (*(Symbol(name, real=True) for name in parameters), *(Dummy(real=True) for _ in starts))
+        self._starts = frozenset(starts)
         self._equations: dict[Model, Differentiated] = {}
 
     def __call__(self, model: Model) -> Differentiated:
@@ -56,6 +63,10 @@ class DifferentiatedEquations:
             integrands = [quantities[name] ** power for name, power in self._integrands]
             self._equations[model] = Differentiated(model.form, rows, self._symbols, quantities, integrands)
         return self._equations[model]
+
+    def at_start(self, states: Sequence[str]) -> Array:
+        """(n, m) derivatives of states by the parameters and start values, at the start."""
+        return np.array([[float(name == state and name in self._starts) for name in self.columns] for state in states])
 
 
 class MotionSlopes:
@@ -105,10 +116,13 @@ class MotionSlopes:
         carrying = None if sets is None else SensitivityTransfer(sets, motion.values, self.equations, self.sizes)
         length, fixed = self.legs[-1].end - self.legs[0].start, np.zeros(count)
         jumps = JumpConditions(self.equations, carrying, self.sizes, self._swiftest.__getitem__, length)
-        slopes = np.zeros((self._swiftest[self.legs[0].model].size, count))
-        if carrying is not None and motion.start is not None:
-            size, first = len(self.legs[0].model.states), np.zeros((len(motion.start.model.states), count))
-            loose, leg = motion.start, self.legs[0]
+        leg = self.legs[0]
+        size, slopes = len(leg.model.states), np.zeros((self._swiftest[leg.model].size, count))
+        if carrying is None or motion.start is None:
+            slopes[:size] = self.equations.at_start(leg.model.states).reshape(size, count)
+        else:
+            loose, states = motion.start, motion.start.model.states
+            first = self.equations.at_start(states).reshape(len(states), count)
             end = End(loose.at(loose.high)[1], leg.at(leg.low)[1], first, fixed)
             slopes[:size] = carrying.over(loose, leg, [end], self._transitions(leg))[1]
         self._shifts.append(fixed)

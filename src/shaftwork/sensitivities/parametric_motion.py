@@ -31,6 +31,7 @@ class ParametricMotion:
         span: start and end of the motion, s.
         initial: start values of states, which do not change with the parameters.
         rtol: relative tolerance of the derivatives; the motion is computed a hundred times closer.
+        starts: states whose start values are parameters, too.
 
     Raises:
         CompileError: there are no symbolic equations for a part of the way.
@@ -47,13 +48,15 @@ class ParametricMotion:
         span: tuple[float, float],
         initial: Given,
         rtol: float,
+        starts: Sequence[str] = (),
     ) -> None:
-        self.model, self._span, self._initial = network_of(net).compile(), span, initial
+        self.model, self._span, self._starts = network_of(net).compile(), span, tuple(starts)
         refuse_sampled(self.model.form, "its derivatives by parameters are not followed from instant to instant")
         refuse_motion(initial, "motion_sensitivities")
         self._rtol = relative_tolerance(rtol)
         states = {state.name for state in self.model.form.states}
-        if unknown := [name for name in initial or {} if name not in states]:
+        self._initial = {**dict.fromkeys(starts, 0.0), **(initial or {})}
+        if unknown := [name for name in self._initial if name not in states]:
             raise ParameterError(
                 f"'{unknown[0]}' is no state, so it starts at another state for other parameters. Give start values of "
                 f"states: {', '.join(sorted(states))}."
@@ -63,30 +66,35 @@ class ParametricMotion:
         self.nominal = self.motion({})
         """The motion for the values of the network."""
         names = smooth_parameters(self.model, parameters, self.nominal.models, span)
-        names = without_start(self.model, names, initial, span, are_asked=parameters is not None)
-        self.parameters = {name: self.model.parameters[name] for name in names}
-        """Values of the network in SI."""
+        names = without_start(self.model, names, self._initial, span, are_asked=parameters is not None)
+        self.parameters = {
+            **{name: self.model.parameters[name] for name in names},
+            **{name: self._initial[name] for name in starts},
+        }
+        """Values of the network, and behind them start values, in SI."""
         if unknown := [name for name in quantities if name not in self.nominal.solution]:
             _ = self.nominal.solution[unknown[0]]  # raises, with what there is
-        self._equations = DifferentiatedEquations(names, quantities, integrands)
+        self._equations = DifferentiatedEquations(names, starts, quantities, integrands)
 
     def motion(self, values: Mapping[str, float]) -> DifferentiatedMotion:
-        """The motion for other values in SI, which change no structure.
+        """The motion for other values of parameters and start values in SI, which change no structure.
 
         Raises:
             SimulationError: it could not be found, or a prescribed speed jumps.
         """
+        initial = {**self._initial, **{name: values[name] for name in self._starts if name in values}}
+        values = {name: value for name, value in values.items() if name not in self._starts}
         # No engine takes a tolerance below 1e-13.
-        return motion_of(self.model, self._span, self._initial, max(1e-2 * self._rtol, 1e-13), values)
+        return motion_of(self.model, self._span, initial or None, max(1e-2 * self._rtol, 1e-13), values)
 
-    def slopes(self, motion: DifferentiatedMotion) -> MotionSlopes:
-        """The derivatives of a motion by the parameters.
+    def slopes(self, motion: DifferentiatedMotion, values: Mapping[str, float]) -> MotionSlopes:
+        """The derivatives of the motion for some values, by the parameters and start values.
 
         Raises:
             SimulationError: there are none.
         """
-        values = [motion.values.get(name, value) for name, value in self.parameters.items()]
-        return MotionSlopes(motion, self._equations, np.array(values), self._rtol)
+        parameters = np.array([values.get(name, value) for name, value in self.parameters.items()])
+        return MotionSlopes(motion, self._equations, parameters, self._rtol)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +126,7 @@ def trajectory_sensitivities(
     t: Sequence[float] | Array,
     *,
     parameters: Sequence[str] | None = None,
+    starts: str | Sequence[str] = (),
     initial: Given = None,
     rtol: float = 1e-9,
 ) -> TrajectorySensitivities:
@@ -131,6 +140,7 @@ def trajectory_sensitivities(
         quantities: names of speeds, torques or twists, "shaft.tau".
         t: times in s, ascending; the motion starts at 0.
         parameters: names, "shaft.c"; by default all in which the motion is smooth.
+        starts: names of states, "J1.omega", by whose start values is differentiated as well.
         initial: start values of states, which do not change with the parameters.
         rtol: relative tolerance of the derivatives.
 
@@ -146,8 +156,8 @@ def trajectory_sensitivities(
     names = as_names(quantities)
     if not names:
         raise SignalError("No quantity is named. Give names such as 'shaft.tau'.")
-    motion = ParametricMotion(net, names, (), parameters, (0.0, float(times[-1])), initial, rtol)
-    slopes = motion.slopes(motion.nominal)
+    motion = ParametricMotion(net, names, (), parameters, (0.0, float(times[-1])), initial, rtol, as_names(starts))
+    slopes = motion.slopes(motion.nominal, {})
     return TrajectorySensitivities(
         motion.model.name,
         motion.parameters,

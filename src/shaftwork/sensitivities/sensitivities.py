@@ -131,7 +131,7 @@ def motion_sensitivities(
     motion = ParametricMotion(
         net, tuple(quantities), tuple(integrands), _listed(parameters), time_span(0.0, t_end), initial, rtol
     )
-    solution, slopes = motion.nominal.solution, motion.slopes(motion.nominal)
+    solution, slopes = motion.nominal.solution, motion.slopes(motion.nominal, {})
     integrals = dict(zip(integrands, slopes.integrals(), strict=True))
     results = {name: measured(item, solution, slopes, integrals) for name, item in read.items()}
     values = {name: value for name, (value, _) in results.items()}
