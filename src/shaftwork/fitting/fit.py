@@ -19,7 +19,7 @@ from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import checked_parameter, relative_tolerance, repeated
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import refuse_motion
-from shaftwork.pipeline.network import Network, network_of
+from shaftwork.pipeline.network import Network, network_of, with_values
 from shaftwork.results.observer import array_in_si
 
 Range = tuple[float | None, float | None]
@@ -42,6 +42,7 @@ def fit(
     record: Mapping[str, Any],
     unknowns: Sequence[str] | Mapping[str, Range | None],
     *,
+    start: Mapping[str, float] | None = None,
     sigma: float | Mapping[str, float] | None = None,
     priors: Mapping[str, tuple[float, float]] | None = None,
     loss: str = "linear",
@@ -61,16 +62,17 @@ def fit(
     changes; then true intervals are wider.
 
     Args:
-        net: the network; its values are the start.
+        net: the network.
         record: {"t": times in s, "shaft.tau": values, ...}, also a pandas data frame; NaN is no value. Times count from
             the start of the motion. Or {"f": frequencies in Hz, "shaft.tau / motor.tau": complex values}, output over
             input. SI, or pint quantities.
         unknowns: names, ["shaft.c", "shaft.d"], also of states whose start values are unknown, "J1.omega"; or by name
             (low, high), None leaves a side open.
+        start: values of unknowns to start from; by default those of the network, and of `initial`.
         sigma: standard deviation of the noise in SI, one or by quantity; by default it is estimated from the record.
         priors: by name (value, standard deviation), what is known of an unknown without the record.
         loss: "linear", or for records with outliers "soft_l1", "huber" or "cauchy", see scipy's `least_squares`.
-        initial: start values of states, from which unknown ones start.
+        initial: start values of states.
         at: for a frequency response the point about which the network swings, as for `Model.linearize`.
         rtol: relative tolerance of the derivatives; motions are computed a hundred times closer.
 
@@ -79,10 +81,15 @@ def fit(
         SignalError: there is no such quantity.
         SimulationError: the motion at the start cannot be computed.
     """
-    netlist = network_of(net).netlist()
     refuse_motion(initial, "fit")
-    model = net.compile()
+    netlist, model = network_of(net).netlist(), net.compile()
     ranges = _ranges(netlist, model, unknowns)
+    if others := [name for name in start or {} if name not in ranges]:
+        raise ParameterError(f"'{others[0]}' has a start and is not unknown. Unknown are: {', '.join(ranges)}.")
+    if start:
+        initial = {**(initial or {}), **{name: start[name] for name in start if name not in model.parameters}}
+        net = with_values(net, {name: value for name, value in start.items() if name not in initial})
+        model = net.compile()
     start = {name: model.parameters.get(name, (initial or {}).get(name, 0.0)) for name in ranges}
     declared = [_declared(netlist, name) if name in model.parameters else None for name in ranges]
     ends = [_ends(parameter, span) for parameter, span in zip(declared, ranges.values(), strict=True)]
@@ -171,8 +178,8 @@ def _refuse_outside(start: Mapping[str, float], ends: Sequence[tuple[float, floa
     for (name, value), (low, high) in zip(start.items(), ends, strict=True):
         if not low < value < high:
             raise ParameterError(
-                f"'{name}' = {value:g} is where the fit starts, and must lie between {low:g} and {high:g}. Give the "
-                "network another value, or another range."
+                f"'{name}' = {value:g} is where the fit starts, and must lie between {low:g} and {high:g}. Give "
+                "another one, start={...}, or another range."
             )
 
 

@@ -30,7 +30,7 @@ class Fit:
     """Parameters of a network that fit a record.
 
     Args:
-        network: that the fit began with.
+        network: with the values that the fit began with.
         units: of the unknowns by name; `AT_START` of start values.
         start: values of the unknowns in the network.
         scale: of the unknowns.
@@ -177,13 +177,13 @@ class Fit:
     def _rows(self) -> tuple[str, list[str], list[list[str]], list[str]]:
         """Title, headings, rows and notes."""
         names, level = ", ".join(self.samples), 0.95
-        title = f"{self.network.name}: {len(self.values)} parameters from {self.data.measured.size} values of {names}"
+        title = f"{self.network.name}: {len(self.values)} unknowns from {self.data.measured.size} values of {names}"
         rows = [
             [name, f"{value:.6g}", f"{low:.6g}", f"{high:.6g}", f"{self.start[name]:.6g}", self.units[name]]
             for (name, value), (low, high) in zip(self.values.items(), self.intervals(level).values(), strict=True)
         ]
         notes = [
-            f"{name}: noise {noise:.3g}, correlation of neighbours {self.correlation[name]:.2f}"
+            f"{name}: noise {noise:.3g}, correlation of neighbours {self.correlation[name]:z.2f}"
             for name, noise in self.noise.items()
         ]
         for spread, shares in self.unseen:

@@ -1,0 +1,208 @@
+"""Fits of records that are computed for known values, with noise: true values come back, within their intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+import sympy
+
+import shaftwork as sw
+
+
+def gapped(rng: np.random.Generator) -> sw.Network:
+    net = sw.Network("gap")
+    net.add(sw.TorqueSource("motor", tau=30.0 * sympy.sin(3.0 * sw.t)), "rotor")
+    net.add(sw.Inertia("J1", J=rng.uniform(1.0, 3.0)), "rotor")
+    coupling = sw.Backlash("shaft", c=rng.uniform(300.0, 2000.0), d=rng.uniform(1.0, 5.0), gap=rng.uniform(0.01, 0.05))
+    net.add(coupling, "rotor", "wheel")
+    net.add(sw.Inertia("J2", J=rng.uniform(1.0, 3.0)), "wheel")
+    net.add(sw.Damper("load", d=rng.uniform(0.5, 2.0)), "wheel")
+    return net
+
+
+def sticking(rng: np.random.Generator) -> sw.Network:
+    net = sw.Network("friction")
+    net.add(sw.TorqueSource("motor", tau=30.0 * sympy.sin(2.0 * sw.t)), "rotor")
+    net.add(sw.Inertia("J1", J=rng.uniform(1.0, 3.0)), "rotor")
+    net.add(sw.Spring("shaft", c=rng.uniform(300.0, 2000.0), d=rng.uniform(1.0, 5.0)), "rotor", "wheel")
+    net.add(sw.Inertia("J2", J=rng.uniform(1.0, 3.0)), "wheel")
+    net.add(sw.CoulombLoad("load", tau=rng.uniform(5.0, 15.0)), "wheel")
+    return net
+
+
+def smooth(rng: np.random.Generator) -> sw.Network:
+    net = sw.Network("smooth")
+    net.add(sw.KlossMotor("motor", tau_k=rng.uniform(8.0, 12.0), s_k=0.25, n_sync=3000, ratio=35.5), "rotor")
+    net.add(sw.Inertia("J1", J=rng.uniform(20.0, 30.0)), "rotor")
+    net.add(sw.Spring("shaft", c=rng.uniform(1e4, 3e4), d=rng.uniform(10.0, 50.0)), "rotor", "wheel")
+    net.add(sw.Inertia("J2", J=rng.uniform(40.0, 80.0)), "wheel")
+    net.add(sw.Damper("load", d=rng.uniform(1.0, 5.0)), "wheel")
+    return net
+
+
+def record(net: sw.Network, names: Sequence[str], rng: np.random.Generator, t_end: float = 4.0) -> dict[str, object]:
+    """401 values of quantities, with noise of 2 percent."""
+    t = np.linspace(0.0, t_end, 401)
+    sol = net.simulate(t_end, t_eval=t)
+    return {"t": t, **{name: sol[name] + rng.normal(0.0, 0.02 * np.abs(sol[name]).max(), t.size) for name in names}}
+
+
+@pytest.mark.slow
+def test_true_values_are_within_their_intervals_as_often_as_these_say() -> None:
+    inside = []
+    for seed in range(50):
+        rng = np.random.default_rng(seed)
+        net, names = (
+            (gapped(rng), ["shaft.gap", "shaft.c", "shaft.d", "J2.J"]),
+            (sticking(rng), ["load.tau", "shaft.c", "shaft.d", "J2.J"]),
+            (smooth(rng), ["shaft.c", "shaft.d", "motor.tau_k", "load.d"]),
+            (smooth(rng), ["motor.tau_k", "shaft.c", "shaft.d", "load.d"]),
+            (smooth(rng), ["shaft.d", "shaft.c", "motor.tau_k", "load.d"]),
+        )[seed % 5]
+        true = net.compile().parameters
+        start = {name: true[name] * rng.uniform(0.85, 1.15) for name in names}
+        fit = sw.fit(net, record(net, ["shaft.tau", "J2.omega"], rng), names, start=start)
+        inside.append([low <= true[name] <= high for name, (low, high) in fit.intervals().items()])
+    # of 50 cases of 0.95, 44 to 50 with a probability of 0.99; of all 200, which hang together, 180
+    assert sum(row[0] for row in inside) >= 44
+    assert np.sum(inside) >= 180
+
+
+def test_the_crane_comes_back() -> None:
+    net, rng = sw.scenes.crane_start(), np.random.default_rng(3)
+    t = np.linspace(0.0, 6.5, 326)
+    measured = net.simulate(6.5, t_eval=t)["shaft.tau"] + rng.normal(0.0, 3.0, t.size)
+    fit = sw.fit(net, {"t": t, "shaft.tau": measured}, ["shaft.c", "shaft.d"], start={"shaft.c": 22000.0})
+    true = net.compile().parameters
+    for name, (low, high) in fit.intervals(0.999).items():
+        assert low < true[name] < high
+        assert high - low < 0.1 * true[name]
+    assert fit.noise["shaft.tau"] == pytest.approx(3.0, rel=0.15)  # of 326 values, to some 4 percent
+    assert abs(fit.correlation["shaft.tau"]) < 4 * t.size**-0.5
+    assert not fit.by_differences
+    assert not fit.unseen
+    assert fit.fitted.compile().parameters["shaft.c"] == fit.values["shaft.c"]
+
+
+def test_a_record_without_noise_gives_the_values_themselves() -> None:
+    net = gapped(np.random.default_rng(5))
+    t = np.linspace(0.0, 4.0, 201)
+    sol = net.simulate(4.0, t_eval=t, rtol=1e-11)
+    true = net.compile().parameters
+    names = ["shaft.c", "shaft.gap", "J2.J"]
+    fit = sw.fit(net, {"t": t, "J2.omega": sol["J2.omega"]}, names, start={name: 0.93 * true[name] for name in names})
+    assert fit.values == pytest.approx({name: true[name] for name in names}, rel=1e-6)
+
+
+def test_speeds_alone_do_not_tell_how_heavy_a_train_is() -> None:
+    net, rng = smooth(np.random.default_rng(0)), np.random.default_rng(1)
+    names = ["shaft.c", "shaft.d", "J1.J", "J2.J", "motor.tau_k", "load.d"]
+    fit = sw.fit(net, record(net, ["J2.omega"], rng), names)
+    ((spread, shares),) = fit.unseen
+    assert np.isinf(spread)
+    # all by the same factor: equal shares, to the tolerance of the derivatives
+    assert np.abs(list(shares.values())) == pytest.approx(np.full(6, 6**-0.5), rel=1e-3)
+    assert all(np.isinf(deviation) for deviation in fit.deviations.values())
+    assert "not at all" in str(fit)
+    prior = sw.fit(net, record(net, ["J2.omega"], rng), names, priors={"J1.J": (net.compile().parameters["J1.J"], 0.1)})
+    assert all(np.isfinite(spread) for spread, _ in prior.unseen)
+
+
+def test_a_start_value_is_found_with_the_parameters() -> None:
+    net, rng = sw.Network("decay"), np.random.default_rng(2)
+    net.add(sw.Spring("shaft", c=100.0, d=0.5), "wheel", "ground")
+    net.add(sw.Inertia("J", J=2.0), "wheel")
+    net.add(sw.CoulombLoad("bearing", tau=2.0), "wheel")
+    t = np.linspace(0.0, 3.0, 301)
+    speed = net.simulate(3.0, initial={"J.omega": 5.0}, t_eval=t)["J.omega"] + rng.normal(0.0, 0.05, t.size)
+    fit = sw.fit(net, {"t": t, "J.omega": speed}, ["J.omega", "shaft.c"], start={"J.omega": 4.0, "shaft.c": 95.0})
+    low, high = fit.intervals(0.999)["J.omega"]
+    assert low < 5.0 < high
+    assert fit.starts == {"J.omega": fit.values["J.omega"]}
+    assert fit.parameters == {"shaft.c": fit.values["shaft.c"]}
+
+
+def test_a_frequency_response_tells_stiffness_and_damping() -> None:
+    net, rng = sw.scenes.crane_start(), np.random.default_rng(4)
+    point, f = {"J1.omega": 8.0, "J2.omega": 8.0}, np.linspace(1.0, 15.0, 60)
+    response = net.frequency_response("motor.tau", "shaft.tau", f, at=point).values
+    noisy = response + rng.normal(0.0, 0.02, f.size) + 1j * rng.normal(0.0, 0.02, f.size)
+    fit = sw.fit(
+        net,
+        {"f": f, "shaft.tau / motor.tau": noisy},
+        ["shaft.c", "shaft.d"],
+        start={"shaft.c": 21000.0, "shaft.d": 10.0},
+        at=point,
+    )
+    true = net.compile().parameters
+    for name, (low, high) in fit.intervals(0.999).items():
+        assert low < true[name] < high
+    assert fit.by_differences
+    assert fit.residuals["shaft.tau / motor.tau"].dtype == complex
+
+
+def test_missing_values_and_the_order_of_rows_change_nothing() -> None:
+    net, rng = sticking(np.random.default_rng(7)), np.random.default_rng(8)
+    rows = record(net, ["J1.omega"], rng)
+    t, speed = np.asarray(rows["t"]), np.asarray(rows["J1.omega"])
+    plain = sw.fit(net, {"t": t, "J1.omega": speed}, ["load.tau"])
+    order = rng.permutation(t.size + 1)
+    mixed = {"t": np.append(t, 1.0)[order], "J1.omega": np.append(speed, np.nan)[order]}
+    assert sw.fit(net, mixed, "load.tau").values == pytest.approx(plain.values, rel=1e-9)
+
+
+def test_a_controller_that_samples_is_fitted_by_differences() -> None:
+    net, rng = sw.Network("loop"), np.random.default_rng(9)
+    net.add(sw.Inertia("J", J=2.0), "wheel")
+    net.add(sw.Damper("load", d=0.4), "wheel")
+    controller = sw.TransferFunctionController(
+        "loop", numerator=[-3.0], denominator=[1.0], measured="J.omega", reference=10.0, sample_time=0.05
+    )
+    net.add(controller, "wheel")
+    fit = sw.fit(net, record(net, ["J.omega"], rng, 3.0), ["J.J"], start={"J.J": 1.6})
+    low, high = fit.intervals(0.999)["J.J"]
+    assert low < 2.0 < high
+    assert fit.by_differences
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"record": {"t": [0.0, 1.0]}}, "beside it what was measured"),
+        ({"record": {"shaft.tau": [0.0, 1.0]}}, "column 't'"),
+        ({"record": {"t": [0.0, 1.0], "shaft.tau": [1.0]}}, "as many"),
+        ({"record": {"t": [-1.0, 1.0], "shaft.tau": [1.0, 2.0]}}, "from zero on"),
+        ({"record": {"t": [0.0, 1.0], "shaft.tau": [np.nan, np.nan]}}, "no finite value"),
+        ({"record": 3}, "is no record"),
+        ({"unknowns": []}, "Nothing is unknown"),
+        ({"unknowns": ["shaft.c", "shaft.c"]}, "named twice"),
+        ({"unknowns": ["shaft.k"]}, "no parameter 'shaft.k'"),
+        ({"unknowns": {"shaft.c": (3e4, 1e4)}}, "is no range"),
+        ({"unknowns": {"shaft.c": 3e4}}, "is no range"),
+        ({"unknowns": {"shaft.c": (3e4, 4e4)}}, "is where the fit starts"),
+        ({"start": {"J1.J": 2.0}}, "is not unknown"),
+        ({"priors": {"J1.J": (2.0, 1.0)}}, "is not unknown"),
+        ({"priors": {"shaft.c": (2e4, -1.0)}}, "standard deviation"),
+        ({"sigma": 0.0}, "must be positive"),
+        ({"sigma": {}}, "no value for 'shaft.tau'"),
+        ({"loss": "absolute"}, "no loss 'absolute'"),
+        ({"record": {"f": [1.0, 2.0], "shaft.tau": [1.0, 2.0]}}, "is no response"),
+        ({"record": {"t": [1.0], "shaft.tau": [1.0]}, "unknowns": ["shaft.c", "shaft.d"]}, "1 values for 2 unknowns"),
+    ],
+)
+def test_what_is_wrong_is_said(change: dict[str, object], words: str) -> None:
+    arguments: dict[str, object] = {
+        "record": {"t": [0.5, 1.0, 1.5], "shaft.tau": [100.0, 200.0, 150.0]},
+        "unknowns": ["shaft.c"],
+        **change,
+    }
+    with pytest.raises(sw.ParameterError, match=words):
+        sw.fit(sw.scenes.crane_start(), **arguments)  # type: ignore[arg-type]
+
+
+def test_a_picture_shows_the_record_and_what_is_left() -> None:
+    net, rng = sticking(np.random.default_rng(7)), np.random.default_rng(8)
+    figure = sw.fit(net, record(net, ["J1.omega", "shaft.tau"], rng), ["load.tau"]).plot()
+    assert [axes.get_ylabel() for axes in figure.axes] == ["J1.omega", "residual", "shaft.tau", "residual"]

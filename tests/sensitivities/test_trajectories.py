@@ -1,0 +1,64 @@
+"""Quantities over time and their derivatives: against differences of motions, and where they are refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import shaftwork as sw
+
+
+@pytest.mark.parametrize(
+    ("name", "step"),
+    [("shaft.c", 2e-5), ("shaft.gap", 1e-5), ("J1.J", 1e-5), ("load.tau", 1e-5), ("motor.tau_k", 1e-5)],
+)
+def test_derivatives_through_all_phases_are_the_differences_of_two_motions(name: str, step: float) -> None:
+    net = sw.scenes.six_phases()
+    model, t = net.compile(), np.linspace(0.0, 10.0, 201)
+    exact = sw.studies.trajectory_sensitivities(net, ["shaft.tau", "J2.omega"], t, parameters=[name])
+    value = model.parameters[name]
+    high, low = (
+        model.simulate(10.0, parameters={name: value * (1 + sign * step)}, rtol=1e-12, t_eval=t) for sign in (1, -1)
+    )
+    for quantity in exact.slopes:
+        difference = (high[quantity] - low[quantity]) / (2 * value * step)
+        # motions to 1e-12 over steps of 1e-5, and the square of a step over the time of an oscillation
+        assert np.abs(exact[quantity][name] - difference).max() < 2e-6 * np.abs(difference).max()
+
+
+def test_the_derivative_by_a_start_value_is_that_of_a_decay() -> None:
+    net = sw.Network("decay")
+    net.add(sw.Inertia("J", J=2.0), "wheel")
+    net.add(sw.Damper("bearing", d=3.0), "wheel")
+    t = np.linspace(0.0, 2.0, 41)
+    made = sw.studies.trajectory_sensitivities(
+        net, "J.omega", t, parameters=["bearing.d"], starts="J.omega", initial={"J.omega": 5.0}
+    )
+    # omega = omega_0 exp(-d t / J); relative tolerance 1e-9
+    assert made.values["J.omega"] == pytest.approx(5.0 * np.exp(-1.5 * t), rel=1e-9)
+    assert made["J.omega"]["J.omega"] == pytest.approx(np.exp(-1.5 * t), rel=1e-8)
+    assert made["J.omega"]["bearing.d"] == pytest.approx(-5.0 * t / 2.0 * np.exp(-1.5 * t), rel=1e-8, abs=1e-12)
+
+
+def test_a_start_value_counts_until_the_drive_sticks() -> None:
+    net = sw.Network("stop")
+    net.add(sw.Inertia("J", J=2.0), "wheel")
+    net.add(sw.CoulombLoad("brake", tau=4.0), "wheel")
+    t = np.array([0.5, 1.0, 3.0])  # omega = 5 - 2 t, at rest from 2.5 s on
+    made = sw.studies.trajectory_sensitivities(
+        net, "J.omega", t, parameters=["brake.tau"], starts="J.omega", initial={"J.omega": 5.0}
+    )
+    assert made["J.omega"]["J.omega"] == pytest.approx([1.0, 1.0, 0.0], abs=1e-9)
+    assert made["J.omega"]["brake.tau"] == pytest.approx([-0.25, -0.5, 0.0], abs=1e-9)
+
+
+def test_what_is_wrong_with_times_and_names_is_said() -> None:
+    net = sw.scenes.crane_start()
+    with pytest.raises(sw.ParameterError, match="ascend from zero"):
+        sw.studies.trajectory_sensitivities(net, "shaft.tau", [1.0, 0.5])
+    with pytest.raises(sw.SignalError, match="No quantity is named"):
+        sw.studies.trajectory_sensitivities(net, [], [1.0])
+    with pytest.raises(sw.SignalError, match=r"'shaft' has:"):
+        sw.studies.trajectory_sensitivities(net, "shaft.tua", [1.0])
+    with pytest.raises(sw.ParameterError, match="is no state"):
+        sw.studies.trajectory_sensitivities(net, "shaft.tau", [1.0], starts="motor.omega")
