@@ -28,7 +28,7 @@ class Source(Protocol):
         ...
 
 
-class Scale:
+class Scaling:
     """Parameters as numbers near one: logarithms of those that stay above zero, others by their size.
 
     Args:
@@ -64,7 +64,7 @@ class ScaledCurves:
         scale: of the unknowns.
     """
 
-    def __init__(self, source: Source, scale: Scale) -> None:
+    def __init__(self, source: Source, scale: Scaling) -> None:
         self._source, self._scale = source, scale
         self._last: tuple[bytes, Array] = b"", np.empty(0)
         self.by_differences = False

@@ -12,7 +12,7 @@ import numpy as np
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import Parameter, is_quantity
-from shaftwork.fitting.curves import RecordedResponse, Scale, ScaledCurves, Source, recorded_motion
+from shaftwork.fitting.curves import RecordedResponse, Scaling, ScaledCurves, Source, recorded_motion
 from shaftwork.fitting.estimation import LOSSES, Data, estimate
 from shaftwork.fitting.fit_result import AT_START, Fit
 from shaftwork.network.netlist import Netlist
@@ -93,7 +93,7 @@ def fit(
     start = {name: model.parameters.get(name, (initial or {}).get(name, 0.0)) for name in ranges}
     declared = [_declared(netlist, name) if name in model.parameters else None for name in ranges]
     ends = [_ends(parameter, span) for parameter, span in zip(declared, ranges.values(), strict=True)]
-    scale = Scale(start, np.array([value > 0 <= low for value, (low, _) in zip(start.values(), ends, strict=True)]))
+    scale = Scaling(start, np.array([value > 0 <= low for value, (low, _) in zip(start.values(), ends, strict=True)]))
     _refuse_outside(start, ends)
     domain, series = _series(record)
     samples = {name: one.at for name, one in series.items()}
@@ -249,7 +249,7 @@ def _deviations(sigma: Any, names: Sequence[str]) -> Array | None:
     return deviations
 
 
-def _priors(priors: Mapping[str, tuple[float, float]] | None, scale: Scale) -> tuple[Array, Array]:
+def _priors(priors: Mapping[str, tuple[float, float]] | None, scale: Scaling) -> tuple[Array, Array]:
     """(m,) values expected of the scaled unknowns, and their standard deviations; NaN where nothing is."""
     values, deviations = np.full((2, len(scale.names)), np.nan)
     for name, (value, deviation) in (priors or {}).items():

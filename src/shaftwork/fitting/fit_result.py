@@ -12,7 +12,7 @@ from scipy import stats
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.notebook import html_table
-from shaftwork.fitting.curves import Scale
+from shaftwork.fitting.curves import Scaling
 from shaftwork.fitting.estimation import Data, Estimate
 from shaftwork.pipeline.network import Network, with_values
 from shaftwork.results.plotting import new_figure, plain
@@ -45,7 +45,7 @@ class Fit:
     network: Network
     units: Mapping[str, str]
     start: Mapping[str, float]
-    scale: Scale
+    scale: Scaling
     samples: Mapping[str, Array]
     data: Data
     estimate: Estimate
