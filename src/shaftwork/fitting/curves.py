@@ -37,8 +37,8 @@ class Scaling:
     """
 
     def __init__(self, start: Mapping[str, float], positive: NDArray[np.bool_]) -> None:
-        self.names, values = tuple(start), np.array(list(start.values()))
-        self.positive = positive
+        self.start, self.names, self.positive = start, tuple(start), positive
+        values = np.array(list(start.values()))
         self._sizes = np.where(values == 0.0, 1.0, np.abs(values))
 
     def unknowns(self, values: Array) -> Array:

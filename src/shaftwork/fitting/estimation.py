@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from shaftwork.codegen.array_form.elements import Array
-from shaftwork.core.errors import SimulationError
+from shaftwork.core.errors import ParameterError, SimulationError
 from shaftwork.numerics.tolerances import EQUAL, TYPED
 
 LOSSES: dict[str, Callable[[Array], tuple[Array, Array, Array]]] = {
@@ -101,8 +101,13 @@ def estimate(curves: Curves, data: Data, start: Array, bounds: tuple[Array, Arra
     """Fit the unknowns, and the deviations of the noise in turn with them where these are not given.
 
     Raises:
-        SimulationError: the motion at the start cannot be computed, or the fit does not end.
+        ParameterError: there are fewer values than unknowns.
+        SimulationError: the motion at the start cannot be computed.
     """
+    if data.measured.size < start.size:
+        raise ParameterError(
+            f"The record has {data.measured.size} values for {start.size} unknowns. Give more, or fewer unknowns."
+        )
     unknowns, evaluations = start, 0
     deviations = data.deviations
     residuals = curves.values(start) - data.measured

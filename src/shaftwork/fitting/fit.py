@@ -12,7 +12,7 @@ import numpy as np
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import Parameter, is_quantity
-from shaftwork.fitting.curves import RecordedResponse, Scaling, ScaledCurves, Source, recorded_motion
+from shaftwork.fitting.curves import RecordedResponse, ScaledCurves, Scaling, Source, recorded_motion
 from shaftwork.fitting.estimation import LOSSES, Data, estimate
 from shaftwork.fitting.fit_result import AT_START, Fit
 from shaftwork.network.netlist import Netlist
@@ -82,54 +82,87 @@ def fit(
         SimulationError: the motion at the start cannot be computed.
     """
     refuse_motion(initial, "fit")
-    netlist, model = network_of(net).netlist(), net.compile()
-    ranges = _ranges(netlist, model, unknowns)
-    if others := [name for name in start or {} if name not in ranges]:
-        raise ParameterError(f"'{others[0]}' has a start and is not unknown. Unknown are: {', '.join(ranges)}.")
-    if start:
-        initial = {**(initial or {}), **{name: start[name] for name in start if name not in model.parameters}}
-        net = with_values(net, {name: value for name, value in start.items() if name not in initial})
-        model = net.compile()
-    start = {name: model.parameters.get(name, (initial or {}).get(name, 0.0)) for name in ranges}
-    declared = [_declared(netlist, name) if name in model.parameters else None for name in ranges]
-    ends = [_ends(parameter, span) for parameter, span in zip(declared, ranges.values(), strict=True)]
-    scale = Scaling(start, np.array([value > 0 <= low for value, (low, _) in zip(start.values(), ends, strict=True)]))
-    _refuse_outside(start, ends)
+    ranges = _ranges(network_of(net).netlist(), net.compile(), unknowns)
+    net, initial = _begun(net, tuple(ranges), start or {}, initial or {})
+    fitted = _unknowns(net, ranges, initial)
     domain, series = _series(record)
     samples = {name: one.at for name, one in series.items()}
-    source: Source
-    if domain == "t":
-        source = recorded_motion(net, samples, tuple(ranges), initial, relative_tolerance(rtol))
-    else:
-        source = RecordedResponse(model, {_pair(name): f for name, f in samples.items()}, at)
+    options = relative_tolerance(rtol), initial, at
+    curves = ScaledCurves(_source(net, domain, samples, fitted.scaling.names, *options), fitted.scaling)
     data = Data(
         np.concatenate([one.measured for one in series.values()]),
         np.repeat(np.arange(len(series)), [one.measured.size for one in series.values()]),
         _deviations(sigma, tuple(series)),
-        *_priors(priors, scale),
+        *_priors(priors, fitted.scaling),
         _checked_loss(loss),
     )
-    if data.measured.size < len(ranges):
-        raise ParameterError(
-            f"The record has {data.measured.size} values for {len(ranges)} unknowns. Give more, or fewer unknowns."
-        )
-    low, high = (scale.unknowns(np.array(side)) for side in zip(*ends, strict=True))
-    curves = ScaledCurves(source, scale)
-    estimated = estimate(curves, data, scale.unknowns(np.array(list(start.values()))), (low, high))
-    return Fit(
-        network=net,
-        units={
-            name: parameter.unit if parameter else AT_START for name, parameter in zip(ranges, declared, strict=True)
-        },
-        start=start,
-        scale=scale,
-        samples=samples,
-        data=data,
-        estimate=estimated,
-        domain=domain,
-        initial=dict(initial or {}),
-        by_differences=curves.by_differences,
-    )
+    estimated = estimate(curves, data, fitted.start, (fitted.low, fitted.high))
+    return Fit(net, fitted.units, fitted.scaling, samples, data, estimated, domain, initial, curves.by_differences)
+
+
+class _Unknowns(NamedTuple):
+    """What is fitted.
+
+    Args:
+        scaling: of the unknowns.
+        units: by name.
+        start: (m,) scaled.
+        low: (m,) scaled.
+        high: (m,) scaled.
+    """
+
+    scaling: Scaling
+    units: dict[str, str]
+    start: Array
+    low: Array
+    high: Array
+
+
+def _source(
+    net: Network,
+    domain: str,
+    samples: Mapping[str, Array],
+    names: Sequence[str],
+    rtol: float,
+    initial: Mapping[str, float],
+    at: Mapping[str, float] | None,
+) -> Source:
+    if domain == "t":
+        return recorded_motion(net, samples, names, initial, rtol)
+    return RecordedResponse(net.compile(), {_pair(name): f for name, f in samples.items()}, at)
+
+
+def _begun(
+    net: Network, names: Sequence[str], start: Mapping[str, float], initial: Mapping[str, float]
+) -> tuple[Network, dict[str, float]]:
+    """The network and the start values of its states from which the fit starts."""
+    if others := [name for name in start if name not in names]:
+        raise ParameterError(f"'{others[0]}' has a start and is not unknown. Unknown are: {', '.join(names)}.")
+    states = {name: float(value) for name, value in start.items() if name not in net.compile().parameters}
+    values = {name: value for name, value in start.items() if name not in states}
+    return (with_values(net, values) if values else net), {**initial, **states}
+
+
+def _unknowns(net: Network, ranges: Mapping[str, Range], initial: Mapping[str, float]) -> _Unknowns:
+    """What is fitted, within its bounds.
+
+    Raises:
+        ParameterError: the start is not between them.
+    """
+    model, netlist = net.compile(), net.netlist()
+    start = {name: model.parameters.get(name, initial.get(name, 0.0)) for name in ranges}
+    declared = {name: _declared(netlist, name) if name in model.parameters else None for name in ranges}
+    ends = {name: _ends(declared[name], span) for name, span in ranges.items()}
+    for name, (low, high) in ends.items():
+        if not low < start[name] < high:
+            raise ParameterError(
+                f"'{name}' = {start[name]:g} is where the fit starts, and must lie between {low:g} and {high:g}. Give "
+                "another one, start={...}, or another range."
+            )
+    scaling = Scaling(start, np.array([start[name] > 0 <= low for name, (low, _) in ends.items()]))
+    units = {name: AT_START if parameter is None else parameter.unit for name, parameter in declared.items()}
+    sides = (np.array(values) for values in (list(start.values()), *zip(*ends.values(), strict=True)))
+    return _Unknowns(scaling, units, *map(scaling.unknowns, sides))
 
 
 def _ranges(netlist: Netlist, model: Model, unknowns: Any) -> dict[str, Range]:
@@ -172,15 +205,6 @@ def _ends(parameter: Parameter | None, span: Range) -> tuple[float, float]:
     lows = [end for end in (span[0], *declared) if end is not None]
     highs = [end for end in (span[1], parameter.at_most if parameter else None) if end is not None]
     return max(lows, default=-np.inf), min(highs, default=np.inf)
-
-
-def _refuse_outside(start: Mapping[str, float], ends: Sequence[tuple[float, float]]) -> None:
-    for (name, value), (low, high) in zip(start.items(), ends, strict=True):
-        if not low < value < high:
-            raise ParameterError(
-                f"'{name}' = {value:g} is where the fit starts, and must lie between {low:g} and {high:g}. Give "
-                "another one, start={...}, or another range."
-            )
 
 
 def _series(record: Any) -> tuple[str, dict[str, _Series]]:

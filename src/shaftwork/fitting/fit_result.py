@@ -32,8 +32,7 @@ class Fit:
     Args:
         network: with the values that the fit began with.
         units: of the unknowns by name; `AT_START` of start values.
-        start: values of the unknowns in the network.
-        scale: of the unknowns.
+        scaling: of the unknowns, with the values that the fit began with.
         samples: by quantity, times (k,) in s or frequencies in Hz.
         data: what was measured.
         estimate: what was found, in scaled unknowns.
@@ -44,8 +43,7 @@ class Fit:
 
     network: Network
     units: Mapping[str, str]
-    start: Mapping[str, float]
-    scale: Scaling
+    scaling: Scaling
     samples: Mapping[str, Array]
     data: Data
     estimate: Estimate
@@ -56,7 +54,7 @@ class Fit:
     @cached_property
     def values(self) -> dict[str, float]:
         """All that was fitted, in SI."""
-        return dict(zip(self.scale.names, self.scale.values(self.estimate.unknowns).tolist(), strict=True))
+        return dict(zip(self.scaling.names, self.scaling.values(self.estimate.unknowns).tolist(), strict=True))
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -81,9 +79,9 @@ class Fit:
     @property
     def deviations(self) -> dict[str, float]:
         """Standard deviations of the parameters in SI; infinite where the record tells nothing, NaN at a bound."""
-        slopes = self.scale.slopes(self.estimate.unknowns)
+        slopes = self.scaling.slopes(self.estimate.unknowns)
         sizes = np.sqrt(np.diag(self.estimate.covariance)) * slopes
-        return dict(zip(self.scale.names, sizes.tolist(), strict=True))
+        return dict(zip(self.scaling.names, sizes.tolist(), strict=True))
 
     def intervals(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
         """Confidence intervals by parameter, in SI.
@@ -94,13 +92,13 @@ class Fit:
         Args:
             level: the share of records whose interval holds the true value.
         """
-        freedom = self.data.measured.size - len(self.scale.names)
+        freedom = self.data.measured.size - len(self.scaling.names)
         quantile = (1 + level) / 2
         width = stats.norm.ppf(quantile) if self.data.deviations is not None else stats.t.ppf(quantile, max(freedom, 1))
         reach = width * np.sqrt(np.diag(self.estimate.covariance))
         with np.errstate(over="ignore"):  # of what is not known at all
-            low, high = (self.scale.values(self.estimate.unknowns + sign * reach) for sign in (-1.0, 1.0))
-        return dict(zip(self.scale.names, zip(low.tolist(), high.tolist(), strict=True), strict=True))
+            low, high = (self.scaling.values(self.estimate.unknowns + sign * reach) for sign in (-1.0, 1.0))
+        return dict(zip(self.scaling.names, zip(low.tolist(), high.tolist(), strict=True), strict=True))
 
     @property
     def correlations(self) -> Array:
@@ -120,7 +118,7 @@ class Fit:
         return tuple(
             (
                 spread,
-                {name: share for name, share in zip(self.scale.names, row.tolist(), strict=True) if abs(share) > 0.1},
+                {name: share for name, share in zip(self.scaling.names, row.tolist(), strict=True) if abs(share) > 0.1},
             )
             for spread, row in pairs
             if spread > 1.0
@@ -179,7 +177,7 @@ class Fit:
         names, level = ", ".join(self.samples), 0.95
         title = f"{self.network.name}: {len(self.values)} unknowns from {self.data.measured.size} values of {names}"
         rows = [
-            [name, f"{value:.6g}", f"{low:.6g}", f"{high:.6g}", f"{self.start[name]:.6g}", self.units[name]]
+            [name, f"{value:.6g}", f"{low:.6g}", f"{high:.6g}", f"{self.scaling.start[name]:.6g}", self.units[name]]
             for (name, value), (low, high) in zip(self.values.items(), self.intervals(level).values(), strict=True)
         ]
         notes = [
@@ -190,7 +188,7 @@ class Fit:
             words = ", ".join(f"{name} {share:+.2f}" for name, share in shares.items())
             known = "not at all" if np.isinf(spread) else f"to {100 * spread:.0f} % only"
             notes.append(f"The record tells this combination {known}: {words}.")
-        held = [name for name, ends in zip(self.scale.names, self.estimate.at_bounds.tolist(), strict=True) if ends]
+        held = [name for name, ends in zip(self.scaling.names, self.estimate.at_bounds.tolist(), strict=True) if ends]
         if held:
             notes.append(f"At a bound, and without an interval: {', '.join(held)}.")
         return title, ["", "fitted", "95 % from", "to", "start", "unit"], rows, notes
