@@ -65,7 +65,7 @@ def fit(
         net: the network.
         record: {"t": times in s, "shaft.tau": values, ...}, also a pandas data frame; NaN is no value. Times count from
             the start of the motion. Or {"f": frequencies in Hz, "shaft.tau / motor.tau": complex values}, output over
-            input. SI, or pint quantities.
+            input. Values in SI.
         unknowns: names, ["shaft.c", "shaft.d"], also of states whose start values are unknown, "J1.omega"; or by name
             (low, high), None leaves a side open.
         start: values of unknowns to start from; by default those of the network, and of `initial`.
@@ -73,11 +73,11 @@ def fit(
         priors: by name (value, standard deviation), what is known of an unknown without the record.
         loss: "linear", or for records with outliers "soft_l1", "huber" or "cauchy", see scipy's `least_squares`.
         initial: start values of states.
-        at: for a frequency response the point about which the network swings, as for `Model.linearize`.
+        at: for a frequency response, the point, as for `Model.linearize`.
         rtol: relative tolerance of the derivatives; motions are computed a hundred times closer.
 
     Raises:
-        ParameterError: there is no such parameter, nothing is smooth in it, or an argument is out of its range.
+        ParameterError: there is no such parameter, or an argument is out of its range.
         SignalError: there is no such quantity.
         SimulationError: the motion at the start cannot be computed.
     """
@@ -87,15 +87,9 @@ def fit(
     fitted = _unknowns(net, ranges, initial)
     domain, series = _series(record)
     samples = {name: one.at for name, one in series.items()}
-    options = relative_tolerance(rtol), initial, at
-    curves = ScaledCurves(_source(net, domain, samples, fitted.scaling.names, *options), fitted.scaling)
-    data = Data(
-        np.concatenate([one.measured for one in series.values()]),
-        np.repeat(np.arange(len(series)), [one.measured.size for one in series.values()]),
-        _deviations(sigma, tuple(series)),
-        *_priors(priors, fitted.scaling),
-        _checked_loss(loss),
-    )
+    source = _source(net, domain, samples, fitted.scaling.names, relative_tolerance(rtol), initial, at)
+    curves = ScaledCurves(source, fitted.scaling)
+    data = _data(series, sigma, *_priors(priors, fitted.scaling), loss)
     estimated = estimate(curves, data, fitted.start, (fitted.low, fitted.high))
     return Fit(net, fitted.units, fitted.scaling, samples, data, estimated, domain, initial, curves.by_differences)
 
@@ -290,7 +284,9 @@ def _priors(priors: Mapping[str, tuple[float, float]] | None, scale: Scaling) ->
     return np.where(there, scaled, np.nan), deviations / scale.slopes(scaled)
 
 
-def _checked_loss(loss: str) -> str:
+def _data(series: Mapping[str, _Series], sigma: Any, priors: Array, prior_deviations: Array, loss: str) -> Data:
     if loss not in LOSSES:
         raise ParameterError(f"There is no loss {loss!r}. Take one of: {', '.join(LOSSES)}.")
-    return loss
+    measured = [one.measured for one in series.values()]
+    numbers = np.repeat(np.arange(len(series)), [values.size for values in measured])
+    return Data(np.concatenate(measured), numbers, _deviations(sigma, tuple(series)), priors, prior_deviations, loss)
