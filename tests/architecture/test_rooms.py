@@ -33,6 +33,7 @@ USES = {
     "spectra": "net.simulate(0.1).spectrum('shaft.tau')",
     "reporting": "sw.report(net, sections=['parts'])",
     "torsional": "sw.torsional.Section",
+    "uncertainty": "at('uncertainty.uncertainty').uncertainty(net, {'shaft.c': (90, 110)}, t_end=0.1, measures=['end J2.omega'], samples=2)",
     "fitting": "sw.fit(net, {'t': [0.1, 0.2], 'J2.omega': [0.1, 0.2]}, ['shaft.c'])",
     "live": "sw.live.Session(net, t_end=0.1)",
     "stepper": "net.compile().start().step(0.1)",
@@ -49,6 +50,7 @@ NEEDS = {
     "live": ("reporting", "latex", "drawing", "modelfiles", "frequency", "animation"),
     "fmu": ("ccode",),
     "fitting": ("sensitivities",),
+    "uncertainty": ("sweep",),
 }
 """By feature, those that it is made of."""
 
@@ -59,6 +61,7 @@ JOINS = {
     "modelfiles": ("shaftwork.reporting", "shaftwork.live", "shaftwork.motionfiles"),
     "reporting": ("shaftwork.live",),
     "sensitivities": ("shaftwork.fitting",),
+    "sweep": ("shaftwork.uncertainty",),
     "frequency": ("shaftwork.live", "shaftwork.torsional.forced_train"),
     "hybrid": (
         "shaftwork.waves.hybrid_wave_model",

@@ -18,24 +18,37 @@ if TYPE_CHECKING:
     from shaftwork.sensitivities.sensitivities import frequency_sensitivities, motion_sensitivities
     from shaftwork.sweep.sweep import sweep
     from shaftwork.sweep.sweep_result import Sweep
+    from shaftwork.uncertainty.bands import Bands, bands
+    from shaftwork.uncertainty.uncertainty import uncertainty
+    from shaftwork.uncertainty.uncertainty_result import Probability, Uncertainty
 
 __all__ = [
+    "Bands",
     "Case",
     "Cell",
+    "Probability",
     "Stability",
     "Sweep",
     "TrajectorySensitivities",
     "Trial",
+    "Uncertainty",
     "WorkPrecision",
+    "bands",
     "frequency_sensitivities",
     "motion_sensitivities",
     "stability",
     "sweep",
     "trajectory_sensitivities",
+    "uncertainty",
     "work_precision",
 ]
 
 _HOME = {
+    "Bands": "shaftwork.uncertainty.bands",
+    "Probability": "shaftwork.uncertainty.uncertainty_result",
+    "Uncertainty": "shaftwork.uncertainty.uncertainty_result",
+    "bands": "shaftwork.uncertainty.bands",
+    "uncertainty": "shaftwork.uncertainty.uncertainty",
     "TrajectorySensitivities": "shaftwork.sensitivities.parametric_motion",
     "Sweep": "shaftwork.sweep.sweep_result",
     "frequency_sensitivities": "shaftwork.sensitivities.sensitivities",

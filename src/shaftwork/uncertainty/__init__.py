@@ -1,0 +1,1 @@
+"""How uncertain parameters make measures and courses of a motion uncertain."""

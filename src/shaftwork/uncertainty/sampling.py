@@ -1,0 +1,110 @@
+"""Samples of uncertain parameters: independent ones, and those from which sensitivity indices are estimated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shaftwork.core.errors import ParameterError, imported
+from shaftwork.core.parameters import whole
+from shaftwork.results.observer import Array
+
+METHODS = ("random", "sobol", "morris")
+Distribution = Any
+"""A frozen distribution of scipy.stats, (low, high) for a uniform one, or a list of values that are equally likely."""
+
+
+def quantiles(name: str, distribution: Distribution, shares: Array, ends: tuple[float, float]) -> Array:
+    """(k,) values of a parameter at shares (k,) of its distribution.
+
+    Args:
+        name: of the parameter.
+        distribution: of it.
+        shares: from 0 to 1.
+        ends: shares that stand for 0 and 1 where the distribution has no end.
+
+    Raises:
+        ParameterError: it is no distribution.
+    """
+    if hasattr(distribution, "ppf"):
+        # a grid of shares goes to the ends, which some distributions do not have
+        inside = shares if np.isfinite(distribution.ppf([0.0, 1.0])).all() else np.clip(shares, *ends)
+        return np.asarray(distribution.ppf(inside), dtype=float)
+    if isinstance(distribution, tuple):
+        if len(distribution) == 2 and distribution[0] < distribution[1]:
+            return np.asarray(distribution[0] + shares * (distribution[1] - distribution[0]))
+    elif isinstance(distribution, Sequence | np.ndarray) and not isinstance(distribution, str) and len(distribution):
+        values = np.asarray(distribution, dtype=float)
+        return np.asarray(values[np.minimum((shares * len(values)).astype(int), len(values) - 1)])
+    raise ParameterError(
+        f"'{name}': {distribution!r} is no distribution. Give one of scipy.stats, such as norm(24e3, 500), (low, high) "
+        "for values that are all as likely, or a list of values."
+    )
+
+
+class Design:
+    """The samples of a study.
+
+    Args:
+        distributions: by parameter.
+        method: one of `METHODS`.
+        samples: independent ones; of "sobol" with so many more for each parameter, of "morris" trajectories.
+        seed: of the random numbers.
+
+    Raises:
+        ParameterError: an argument is out of its range.
+        MissingExtraError: SALib is not installed, which "sobol" and "morris" need.
+    """
+
+    def __init__(self, distributions: Mapping[str, Distribution], method: str, samples: int, seed: int) -> None:
+        if method not in METHODS:
+            raise ParameterError(f"There is no method {method!r}. Take one of: {', '.join(METHODS)}.")
+        if not (isinstance(distributions, Mapping) and distributions):
+            raise ParameterError("Nothing is uncertain. Give distributions, such as {'shaft.c': (20e3, 28e3)}.")
+        if whole(samples) is None or samples < 2:
+            raise ParameterError(f"samples = {samples!r} must be a whole number, 2 or more.")
+        self.names, self.method, self.count, self.seed = tuple(map(str, distributions)), method, int(samples), seed
+        if method == "sobol" and self.count & (self.count - 1):
+            raise ParameterError(f"samples = {samples} must be a power of two for Sobol' indices, such as 1024.")
+        shares = self._shares()
+        self.columns = {
+            name: quantiles(name, distribution, column, (0.01, 0.99) if method == "morris" else (0.0, 1.0))
+            for (name, distribution), column in zip(distributions.items(), shares.T, strict=True)
+        }
+        """(rows,) values by parameter."""
+        self.shares = shares
+
+    @property
+    def problem(self) -> dict[str, Any]:
+        """As SALib wants it, in shares of the distributions."""
+        return {"num_vars": len(self.names), "names": list(self.names), "bounds": [[0.0, 1.0]] * len(self.names)}
+
+    def _shares(self) -> Array:
+        """(rows, parameters) shares of the distributions."""
+        if self.method == "random":
+            return np.random.default_rng(self.seed).random((self.count, len(self.names)))
+        sampler = imported(f"SALib.sample.{self.method}", "uncertainty", f"uncertainty(method='{self.method}')")
+        options = {"calc_second_order": False} if self.method == "sobol" else {}
+        return np.asarray(sampler.sample(self.problem, self.count, seed=self.seed, **options))
+
+    @property
+    def independent(self) -> NDArray[np.intp]:
+        """The rows that are independent samples; none of "morris"."""
+        size = len(self.names) + 2  # of Saltelli's scheme: one sample, one change of each parameter, another sample
+        if self.method == "sobol":
+            return np.sort(
+                np.concatenate([np.arange(0, self.count * size, size), np.arange(size - 1, self.count * size, size)])
+            )
+        return np.arange(self.count if self.method == "random" else 0)
+
+    def indices(self, values: Array, level: float) -> dict[str, Array]:
+        """SALib's analysis of a measure (rows,)."""
+        analysis = imported(f"SALib.analyze.{self.method}", "uncertainty", "Uncertainty.indices()")
+        if self.method == "sobol":
+            found = analysis.analyze(self.problem, values, calc_second_order=False, conf_level=level, seed=self.seed)
+            return {name: np.asarray(found[name]) for name in ("S1", "S1_conf", "ST", "ST_conf")}
+        found = analysis.analyze(self.problem, self.shares, values, conf_level=level, seed=self.seed)
+        return {name: np.asarray(found[name], dtype=float) for name in ("mu", "mu_star", "mu_star_conf", "sigma")}

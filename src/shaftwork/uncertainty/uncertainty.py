@@ -1,0 +1,70 @@
+"""Measures of a motion whose parameters are uncertain: their distribution, and what it comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from shaftwork.core.errors import ParameterError
+from shaftwork.pipeline.network import Network
+from shaftwork.results.observer import Array
+from shaftwork.sweep.sweep import Measures, sweep
+from shaftwork.sweep.sweep_result import Sweep
+from shaftwork.uncertainty.sampling import Design, Distribution
+from shaftwork.uncertainty.uncertainty_result import Uncertainty
+
+Columns = Mapping[str, Array]
+
+
+def uncertainty(
+    net: Network | Callable[[Columns], Columns],
+    distributions: Mapping[str, Distribution],
+    *,
+    measures: Measures | None = None,
+    samples: int = 1024,
+    method: str = "random",
+    level: float = 0.95,
+    seed: int = 0,
+    **options: Any,
+) -> Uncertainty:
+    """Draw parameters from their distributions, simulate each sample, and say what that does to measures.
+
+    Law: "random" draws independent samples. "sobol" estimates by Saltelli's scheme which share of the variance comes
+    from each parameter: S1 by itself, ST with all that it does together with others. "morris" screens many parameters
+    at little cost: mu* is the mean size of the change over the whole range of a parameter (of an endless one from 1 %
+    to 99 % of the distribution), sigma its spread, which is large where a parameter acts together with others.
+    Parameters are independent of each other.
+
+    Args:
+        net: the network; or a function from columns of samples by parameter to columns of results by measure.
+        distributions: by parameter, a frozen one of scipy.stats, (low, high) for a uniform one, or a list of values
+            that are equally likely, such as the seeds of a noise.
+        measures: as in `sweep`.
+        samples: how many; of "sobol" a power of two, and as many for each parameter and twice more are simulated; of
+            "morris" the trajectories, each of one motion more than there are parameters.
+        method: "random", "sobol" or "morris", the last two with the extra `uncertainty`.
+        level: of confidence.
+        seed: of the random numbers.
+        **options: of `sweep`: t_end, rtol, engine, initial, processes, store and so on.
+
+    Raises:
+        ParameterError: an argument is out of its range, or a sample is not admissible.
+        MissingExtraError: SALib is not installed.
+    """
+    if not 0.0 < level < 1.0:
+        raise ParameterError(f"level = {level!r} must lie between 0 and 1.")
+    design = Design(distributions, method, samples, seed)
+    if isinstance(net, Network):
+        if measures is None:
+            raise ParameterError("Name what is measured, measures=['max shaft.tau'].")
+        return Uncertainty(sweep(net, samples=design.columns, measures=measures, **options), design, level)
+    if not callable(net):
+        raise ParameterError(f"{net!r} is neither a network nor a function of columns of samples.")
+    results = {str(name): np.asarray(column, dtype=float) for name, column in net(design.columns).items()}
+    rows = len(next(iter(design.columns.values())))
+    if wrong := [name for name, column in results.items() if column.shape != (rows,)]:
+        raise ParameterError(f"The function gives '{wrong[0]}' another length than the {rows} samples.")
+    reasons = tuple("" if np.isfinite(row).all() else "no finite value" for row in zip(*results.values(), strict=True))
+    return Uncertainty(Sweep(getattr(net, "__name__", "function"), design.columns, results, {}, reasons), design, level)

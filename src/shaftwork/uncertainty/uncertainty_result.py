@@ -1,0 +1,209 @@
+"""What uncertain parameters do to measures: distribution, indices, probability of passing a limit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from shaftwork.core.errors import ParameterError
+from shaftwork.core.notebook import html_table
+from shaftwork.core.screen import counted
+from shaftwork.results.observer import Array
+from shaftwork.results.plotting import new_figure, plain
+from shaftwork.sweep.sweep_result import Sweep
+from shaftwork.uncertainty.sampling import Design
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class Probability(NamedTuple):
+    """An estimated probability.
+
+    Args:
+        value: share of the samples.
+        low: of its confidence interval.
+        high: of it.
+    """
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """Samples of uncertain parameters and their measures.
+
+    Args:
+        sweep: all samples that were simulated.
+        design: how they were drawn.
+        level: of confidence.
+    """
+
+    sweep: Sweep
+    design: Design
+    level: float
+
+    def __len__(self) -> int:
+        return len(self.sweep)
+
+    @property
+    def measures(self) -> tuple[str, ...]:
+        """Their names."""
+        return tuple(self.sweep.measures)
+
+    def values(self, measure: str) -> Array:
+        """(k,) a measure of the independent samples that did not fail.
+
+        Raises:
+            ParameterError: there is no such measure, or the samples of "morris" tell no distribution.
+        """
+        rows = self.design.independent
+        if not rows.size:
+            raise ParameterError("Samples of 'morris' tell no distribution. Take method='random' or 'sobol'.")
+        return self._column(measure)[rows[~self.sweep.failed[rows]]]
+
+    def _column(self, measure: str) -> Array:
+        if measure not in self.sweep.measures:
+            raise ParameterError(f"There is no measure '{measure}'. There are: {', '.join(self.measures)}.")
+        return self.sweep.measures[measure]
+
+    def mean(self, measure: str) -> tuple[float, float]:
+        """The mean of a measure and the standard error of it."""
+        values = self.values(measure)
+        return float(values.mean()), float(stats.sem(values))
+
+    def quantiles(self, measure: str, shares: tuple[float, ...] = (0.025, 0.5, 0.975)) -> Array:
+        """The values that are not passed by certain shares of the samples."""
+        return np.asarray(np.quantile(self.values(measure), shares))
+
+    def probability(self, measure: str, *, above: float | None = None, below: float | None = None) -> Probability:
+        """How probable it is that a measure passes a limit.
+
+        Law: the share of the independent samples that do, with the interval of Clopper and Pearson. Samples that failed
+        count as passing: nothing is known of them.
+
+        Args:
+            measure: its name.
+            above: upper limit.
+            below: lower limit.
+
+        Raises:
+            ParameterError: there is no such measure or no limit.
+        """
+        if above is None and below is None:
+            raise ParameterError("Give a limit, above=... or below=....")
+        self.values(measure)
+        rows = self.design.independent
+        values = self._column(measure)[rows]
+        passing: NDArray[np.bool_] = self.sweep.failed[rows].copy()
+        passing |= np.zeros(rows.size, dtype=bool) if above is None else values > above
+        passing |= np.zeros(rows.size, dtype=bool) if below is None else values < below
+        interval = stats.binomtest(int(passing.sum()), rows.size).proportion_ci(self.level)
+        return Probability(float(passing.mean()), float(interval.low), float(interval.high))
+
+    def indices(self, measure: str) -> dict[str, dict[str, tuple[float, float]]]:
+        """Where the uncertainty of a measure comes from: by index and parameter, the value and half its interval.
+
+        Of "sobol" S1, the share of the variance by a parameter alone, and ST, with all that it does together with
+        others; of "morris" mu*, the mean size of the change over the range of a parameter, and sigma, its spread.
+
+        Raises:
+            ParameterError: the samples are random ones, or some of them failed.
+        """
+        column = self._column(measure)
+        if self.design.method == "random":
+            raise ParameterError("Independent samples tell no indices. Take method='sobol' or 'morris'.")
+        if failed := int(self.sweep.failed.sum()):
+            raise ParameterError(
+                f"{counted(failed, 'sample')} of {len(self)} failed, and indices need all of them; see sweep.reasons."
+            )
+        found = self.design.indices(column, self.level)
+        nothing = np.zeros(len(self.design.names))
+        pairs = (
+            {"S1": (found["S1"], found["S1_conf"]), "ST": (found["ST"], found["ST_conf"])}
+            if self.design.method == "sobol"
+            else {"mu*": (found["mu_star"], found["mu_star_conf"]), "sigma": (found["sigma"], nothing)}
+        )
+        return {
+            index: dict(zip(self.design.names, zip(value.tolist(), half.tolist(), strict=True), strict=True))
+            for index, (value, half) in pairs.items()
+        }
+
+    def _rows(self) -> tuple[str, list[str], list[list[str]], list[str]]:
+        failed = int(self.sweep.failed.sum())
+        title = f"{self.sweep.name}: {counted(len(self), 'sample')}, {failed} failed"
+        rows: list[list[str]] = []
+        if self.design.method != "morris":
+            for measure in self.measures:
+                mean, error = self.mean(measure)
+                spread = float(self.values(measure).std(ddof=1))
+                rows.append(
+                    [
+                        measure,
+                        f"{mean:.6g}",
+                        f"{error:.2g}",
+                        f"{spread:.4g}",
+                        *(f"{q:.6g}" for q in self.quantiles(measure)),
+                    ]
+                )
+        notes = list[str]()
+        if self.design.method != "random" and not failed:
+            for measure in self.measures:
+                found = self.indices(measure)
+                leading = next(reversed(found)) if "ST" in found else "mu*"
+                order = sorted(self.design.names, key=lambda name: -found[leading][name][0])
+                notes += [
+                    f"{measure}, {name}: "
+                    + ", ".join(
+                        f"{index} {by[name][0]:z.3g}" + (f" +- {by[name][1]:.2g}" if by[name][1] else "")
+                        for index, by in found.items()
+                    )
+                    for name in order
+                ]
+        return title, ["", "mean", "+-", "deviation", "2.5 %", "50 %", "97.5 %"], rows, notes
+
+    def __str__(self) -> str:
+        title, header, rows, notes = self._rows()
+        widths = [max(len(row[column]) for row in [header, *rows]) for column in range(len(header))]
+        table = [
+            f"{row[0]:{widths[0]}}  "
+            + "  ".join(f"{cell:>{width}}" for cell, width in zip(row[1:], widths[1:], strict=True))
+            for row in ([header, *rows] if rows else [])
+        ]
+        return "\n".join([title, *table, *notes])
+
+    def _repr_html_(self) -> str:
+        title, header, rows, notes = self._rows()
+        return html_table(title, header, rows, "; ".join(notes))
+
+    def plot(self) -> Figure:
+        """Histograms of the measures, and their indices where there are any (extra `plot`).
+
+        Raises:
+            MissingExtraError: matplotlib is not installed.
+        """
+        has_values, has_indices = self.design.method != "morris", self.design.method != "random"
+        columns = has_values + has_indices
+        figure = new_figure("Uncertainty.plot()", 4.6 * columns, 0.6 + 2.8 * len(self.measures), self.sweep.name)
+        grid = figure.subplots(len(self.measures), columns, squeeze=False)
+        for measure, axes in zip(self.measures, grid, strict=True):
+            if has_values:
+                axes[0].hist(self.values(measure), bins="auto", color="tab:blue")
+                axes[0].set_xlabel(plain(measure))
+                axes[0].set_ylabel("samples")
+            if has_indices:
+                found = self.indices(measure)
+                for shift, (index, by) in enumerate(found.items()):
+                    values, halves = zip(*by.values(), strict=True)
+                    places = np.arange(len(by)) + 0.4 * shift - 0.2
+                    axes[-1].barh(places, values, 0.4, xerr=halves, label=index)
+                axes[-1].set_yticks(range(len(self.design.names)), [plain(name) for name in self.design.names])
+                axes[-1].set_xlabel(plain(measure))
+                axes[-1].legend(fontsize=8)
+        return figure
