@@ -170,22 +170,26 @@ def _ranges(netlist: Netlist, model: Model, unknowns: Any) -> dict[str, Range]:
         raise ParameterError("Nothing is unknown. Name what to fit, such as ['shaft.c', 'shaft.d'].")
     if twice := repeated(map(str, listed)):
         raise ParameterError(f"'{twice}' is named twice. Name each unknown once.")
-    ranges: dict[str, Range] = {}
-    for name in listed:
-        span = unknowns[name] if isinstance(unknowns, Mapping) else None
-        if not (span is None or (isinstance(span, Sequence) and not isinstance(span, str) and len(span) == 2)):
-            raise ParameterError(f"'{name}': {span!r} is no range. Give (low, high); None leaves a side open.")
-        is_start = name in {state.name for state in model.form.states}
-        if not is_start:
-            checked_parameter(netlist, name, model.parameters.get(name))  # says which there are
-        ends = [None if end is None else float(end) for end in span or (None, None)]
-        low, high = (
-            ends if is_start else [end if end is None else checked_parameter(netlist, name, end) for end in ends]
-        )
-        if low is not None and high is not None and low >= high:
-            raise ParameterError(f"'{name}': ({low:g}, {high:g}) is no range. The first must be less than the second.")
-        ranges[name] = (low, high)
-    return ranges
+    return {
+        name: _range(netlist, model, name, unknowns[name] if isinstance(unknowns, Mapping) else None) for name in listed
+    }
+
+
+def _range(netlist: Netlist, model: Model, name: str, span: Any) -> Range:
+    """Low and high of one, in SI."""
+    is_start = name in {state.name for state in model.form.states}
+    if not is_start:
+        checked_parameter(netlist, name, model.parameters.get(name))  # says which there are
+    if span is None:
+        return None, None
+    if not (isinstance(span, Sequence) and not isinstance(span, str) and len(span) == 2):
+        raise ParameterError(f"'{name}': {span!r} is no range. Give (low, high); None leaves a side open.")
+    low, high = (
+        end if end is None else float(end) if is_start else checked_parameter(netlist, name, end) for end in span
+    )
+    if low is not None and high is not None and low >= high:
+        raise ParameterError(f"'{name}': ({low:g}, {high:g}) is no range. The first must be less than the second.")
+    return low, high
 
 
 def _declared(netlist: Netlist, name: str) -> Parameter:
@@ -220,23 +224,23 @@ def _series(record: Any) -> tuple[str, dict[str, _Series]]:
     at = array_in_si(domain, _plain(columns.pop(domain)), {"t": "s", "f": "Hz"}[domain])
     if not (at.size and np.isfinite(at).all() and at.min() >= 0.0):
         raise ParameterError(f"'{domain}' must be numbers from zero on. A motion starts at t = 0 s.")
+    return domain, {name: _one_series(name, column, at, domain) for name, column in columns.items()}
+
+
+def _one_series(name: str, column: Any, at: Array, domain: str) -> _Series:
+    """A column in ascending order, without what is missing."""
+    if is_quantity(column):
+        raise ParameterError(f"'{name}' has a unit. Give plain numbers in SI.")
+    values = np.asarray(_plain(column))
+    if values.shape != at.shape:
+        raise ParameterError(f"'{name}' has {values.shape} values, and '{domain}' {at.shape}. They must be as many.")
     order = np.argsort(at, kind="stable")
-    series = {}
-    for name, column in columns.items():
-        if is_quantity(column):
-            raise ParameterError(f"'{name}' has a unit. Give plain numbers in SI.")
-        values = np.asarray(_plain(column))
-        if values.shape != at.shape:
-            raise ParameterError(
-                f"'{name}' has {values.shape} values, and '{domain}' {at.shape}. They must be as many."
-            )
-        ordered = values[order].astype(float if domain == "t" else complex)
-        there = np.isfinite(ordered)
-        if not there.any():
-            raise ParameterError(f"'{name}' has no finite value.")
-        parts = [ordered] if domain == "t" else [ordered.real, ordered.imag]
-        series[name] = _Series(at[order][there], np.concatenate([part[there] for part in parts]))
-    return domain, series
+    ordered = values[order].astype(float if domain == "t" else complex)
+    there = np.isfinite(ordered)
+    if not there.any():
+        raise ParameterError(f"'{name}' has no finite value.")
+    parts = [ordered] if domain == "t" else [ordered.real, ordered.imag]
+    return _Series(at[order][there], np.concatenate([part[there] for part in parts]))
 
 
 def _plain(values: Any) -> Any:

@@ -14,7 +14,7 @@ from shaftwork.core.screen import progress
 from shaftwork.pipeline.network import Network, network_of
 from shaftwork.results.observer import Array, array_in_si
 from shaftwork.results.plotting import new_figure, plain
-from shaftwork.uncertainty.sampling import Design, Distribution
+from shaftwork.uncertainty.draws import Design, Distribution
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -12,7 +12,7 @@ from shaftwork.pipeline.network import Network
 from shaftwork.results.observer import Array
 from shaftwork.sweep.sweep import Measures, sweep
 from shaftwork.sweep.sweep_result import Sweep
-from shaftwork.uncertainty.sampling import Design, Distribution
+from shaftwork.uncertainty.draws import Design, Distribution
 from shaftwork.uncertainty.uncertainty_result import Uncertainty
 
 Columns = Mapping[str, Array]

@@ -15,7 +15,7 @@ from shaftwork.core.screen import counted
 from shaftwork.results.observer import Array
 from shaftwork.results.plotting import new_figure, plain
 from shaftwork.sweep.sweep_result import Sweep
-from shaftwork.uncertainty.sampling import Design
+from shaftwork.uncertainty.draws import Design
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -110,8 +110,7 @@ class Uncertainty:
     def indices(self, measure: str) -> dict[str, dict[str, tuple[float, float]]]:
         """Where the uncertainty of a measure comes from: by index and parameter, the value and half its interval.
 
-        Of "sobol" S1, the share of the variance by a parameter alone, and ST, with all that it does together with
-        others; of "morris" mu*, the mean size of the change over the range of a parameter, and sigma, its spread.
+        S1 and ST of "sobol", mu* and sigma of "morris", as `uncertainty` explains them.
 
         Raises:
             ParameterError: the samples are random ones, or some of them failed.
@@ -135,52 +134,47 @@ class Uncertainty:
             for index, (value, half) in pairs.items()
         }
 
-    def _rows(self) -> tuple[str, list[str], list[list[str]], list[str]]:
+    def _rows(self) -> list[list[str]]:
+        """Cells of the table of distributions."""
+        if self.design.method == "morris":
+            return []
+        rows = [["", "mean", "+-", "deviation", "2.5 %", "50 %", "97.5 %"]]
+        for measure in self.measures:
+            mean, error = self.mean(measure)
+            numbers = f"{mean:.6g}", f"{error:.2g}", f"{self.values(measure).std(ddof=1):.4g}"
+            rows.append([measure, *numbers, *(f"{value:.6g}" for value in self.quantiles(measure))])
+        return rows
+
+    def _shares(self) -> list[list[str]]:
+        """Cells of the table of indices, the strongest parameter first."""
+        if self.design.method == "random" or self.sweep.failed.any():
+            return []
+        rows = list[list[str]]()
+        for measure in self.measures:
+            found = self.indices(measure)
+            leading = found["ST"] if "ST" in found else found["mu*"]
+            rows.append([measure, *(text for index in found for text in (index, "+-"))])
+            for name in sorted(leading, key=lambda name: -leading[name][0]):
+                rows.append([name, *(f"{value:z.3g}" for by in found.values() for value in by[name])])
+        return rows
+
+    @property
+    def _title(self) -> str:
         failed = int(self.sweep.failed.sum())
-        title = f"{self.sweep.name}: {counted(len(self), 'sample')}, {failed} failed"
-        rows: list[list[str]] = []
-        if self.design.method != "morris":
-            for measure in self.measures:
-                mean, error = self.mean(measure)
-                spread = float(self.values(measure).std(ddof=1))
-                rows.append(
-                    [
-                        measure,
-                        f"{mean:.6g}",
-                        f"{error:.2g}",
-                        f"{spread:.4g}",
-                        *(f"{q:.6g}" for q in self.quantiles(measure)),
-                    ]
-                )
-        notes = list[str]()
-        if self.design.method != "random" and not failed:
-            for measure in self.measures:
-                found = self.indices(measure)
-                leading = next(reversed(found)) if "ST" in found else "mu*"
-                order = sorted(self.design.names, key=lambda name: -found[leading][name][0])
-                notes += [
-                    f"{measure}, {name}: "
-                    + ", ".join(
-                        f"{index} {by[name][0]:z.3g}" + (f" +- {by[name][1]:.2g}" if by[name][1] else "")
-                        for index, by in found.items()
-                    )
-                    for name in order
-                ]
-        return title, ["", "mean", "+-", "deviation", "2.5 %", "50 %", "97.5 %"], rows, notes
+        return f"{self.sweep.name}: {counted(len(self), 'sample')}, {failed} failed"
 
     def __str__(self) -> str:
-        title, header, rows, notes = self._rows()
-        widths = [max(len(row[column]) for row in [header, *rows]) for column in range(len(header))]
-        table = [
-            f"{row[0]:{widths[0]}}  "
-            + "  ".join(f"{cell:>{width}}" for cell, width in zip(row[1:], widths[1:], strict=True))
-            for row in ([header, *rows] if rows else [])
-        ]
-        return "\n".join([title, *table, *notes])
+        lines = [self._title]
+        for rows in (self._rows(), self._shares()):
+            widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+            for first, *others in rows:
+                cells = (f"{cell:>{width}}" for cell, width in zip(others, widths[1:], strict=True))
+                lines.append("  ".join([f"{first:{widths[0]}}", *cells]))
+        return "\n".join(lines)
 
     def _repr_html_(self) -> str:
-        title, header, rows, notes = self._rows()
-        return html_table(title, header, rows, "; ".join(notes))
+        tables = [html_table(self._title, rows[0], rows[1:]) for rows in (self._rows(), self._shares()) if rows]
+        return "".join(tables) or html_table(self._title, [], [])
 
     def plot(self) -> Figure:
         """Histograms of the measures, and their indices where there are any (extra `plot`).

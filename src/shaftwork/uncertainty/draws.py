@@ -20,11 +20,7 @@ Distribution = Any
 def quantiles(name: str, distribution: Distribution, shares: Array, ends: tuple[float, float]) -> Array:
     """(k,) values of a parameter at shares (k,) of its distribution.
 
-    Args:
-        name: of the parameter.
-        distribution: of it.
-        shares: from 0 to 1.
-        ends: shares that stand for 0 and 1 where the distribution has no end.
+    Shares of `ends` stand for 0 and 1 where the distribution has no end.
 
     Raises:
         ParameterError: it is no distribution.
