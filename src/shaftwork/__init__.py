@@ -112,6 +112,8 @@ if TYPE_CHECKING:  # `X as X` says to type checkers that X is public
     from shaftwork.fitting.fit_result import Fit as Fit
     from shaftwork.fmu.fmu_parts import FMUSpeed as FMUSpeed, FMUTorque as FMUTorque
     from shaftwork.fmu.foreign_unit import FMU as FMU
+    from shaftwork.optimization.optimize import optimize as optimize
+    from shaftwork.optimization.optimum import Optimum as Optimum
     from shaftwork.pipeline.model import Model as Model
     from shaftwork.pipeline.network import Network as Network
     from shaftwork.reporting.report import Report as Report, report as report
@@ -181,6 +183,8 @@ _HOME = {
     "shaftwork.results.solution": ("Solution",),
     "shaftwork.torsional.calculation": ("torsional_calculation",),
     "shaftwork.fitting.fit": ("fit",),
+    "shaftwork.optimization.optimize": ("optimize",),
+    "shaftwork.optimization.optimum": ("Optimum",),
     "shaftwork.fitting.fit_result": ("Fit",),
 }
 _PACKAGES = ("live", "reduce", "scenes", "sizing", "spice", "studies", "torsional")

@@ -34,6 +34,7 @@ USES = {
     "reporting": "sw.report(net, sections=['parts'])",
     "torsional": "sw.torsional.Section",
     "uncertainty": "at('uncertainty.uncertainty').uncertainty(net, {'shaft.c': (90, 110)}, t_end=0.1, measures=['end J2.omega'], samples=2)",
+    "optimization": "sw.optimize(net, {'shaft.c': (90, 110)}, 'max shaft.tau', t_end=0.1)",
     "fitting": "sw.fit(net, {'t': [0.1, 0.2], 'J2.omega': [0.1, 0.2]}, ['shaft.c'])",
     "live": "sw.live.Session(net, t_end=0.1)",
     "stepper": "net.compile().start().step(0.1)",
@@ -51,6 +52,7 @@ NEEDS = {
     "fmu": ("ccode",),
     "fitting": ("sensitivities",),
     "uncertainty": ("sweep",),
+    "optimization": ("sensitivities", "sweep"),
 }
 """By feature, those that it is made of."""
 
@@ -60,8 +62,8 @@ JOINS = {
     "drawing": ("shaftwork.reporting", "shaftwork.live"),
     "modelfiles": ("shaftwork.reporting", "shaftwork.live", "shaftwork.motionfiles"),
     "reporting": ("shaftwork.live",),
-    "sensitivities": ("shaftwork.fitting",),
-    "sweep": ("shaftwork.uncertainty",),
+    "sensitivities": ("shaftwork.fitting", "shaftwork.optimization"),
+    "sweep": ("shaftwork.uncertainty", "shaftwork.optimization"),
     "frequency": ("shaftwork.live", "shaftwork.torsional.forced_train"),
     "hybrid": (
         "shaftwork.waves.hybrid_wave_model",

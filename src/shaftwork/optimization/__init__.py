@@ -1,0 +1,1 @@
+"""Design variables of a network for which measures of its motion become best."""

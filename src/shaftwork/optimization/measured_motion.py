@@ -1,0 +1,100 @@
+"""Measures of a motion as functions of design variables, with their gradients."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from shaftwork.codegen.array_form.elements import Array
+from shaftwork.core.errors import NetworkError, SimulationError
+from shaftwork.pipeline.network import Network
+from shaftwork.results.measures import Measure
+from shaftwork.sensitivities.parametric_motion import ParametricMotion
+from shaftwork.sensitivities.sensitivities import integrand, measured
+
+Goal = str | Callable[[Mapping[str, float]], float]
+"""A measure, "max shaft.tau", or a function of all parameters, such as a mass or a price."""
+
+
+class MeasuredMotion:
+    """Goals as functions of design variables.
+
+    Args:
+        net: the network.
+        names: of the variables.
+        goals: by name.
+        t_end: end of the motion, s.
+        initial: start values of states.
+        rtol: relative tolerance of the gradients.
+    """
+
+    def __init__(
+        self,
+        net: Network,
+        names: Sequence[str],
+        goals: Mapping[str, Goal],
+        t_end: float,
+        initial: Mapping[str, float] | None,
+        rtol: float,
+    ) -> None:
+        self._names, self._goals = tuple(names), goals
+        self._read = {name: Measure.read(goal) for name, goal in goals.items() if isinstance(goal, str)}
+        self._integrands = [item for one in self._read.values() if (item := integrand(one)) is not None]
+        quantities = tuple(dict.fromkeys(one.quantity for one in self._read.values()))
+        self._motion = ParametricMotion(net, quantities, self._integrands, names, (0.0, t_end), initial, rtol)
+        self._fixed = self._motion.model.parameters
+        self._last: tuple[bytes, dict[str, tuple[float, Array]]] = b"", {}
+        self.motions = 0
+        """How many were computed."""
+
+    def values(self, variables: Array) -> dict[str, float]:
+        """Values of the variables by name."""
+        return dict(zip(self._names, variables.tolist(), strict=True))
+
+    def at(self, variables: Array) -> dict[str, tuple[float, Array]]:
+        """Each goal with its gradient (m,); infinite where there is no motion."""
+        if self._last[0] != (key := variables.tobytes()):
+            self._last = key, self._computed(variables)
+        return self._last[1]
+
+    def _computed(self, variables: Array) -> dict[str, tuple[float, Array]]:
+        values, found = self.values(variables), dict[str, tuple[float, Array]]()
+        if self._read:
+            self.motions += 1
+            try:
+                found = self._measures(values)
+            except (SimulationError, NetworkError):
+                found = {name: (np.inf, np.zeros(variables.size)) for name in self._read}
+        for name, goal in self._goals.items():
+            if not isinstance(goal, str):
+                found[name] = self._of_parameters(goal, variables)
+        return found
+
+    def _measures(self, values: Mapping[str, float]) -> dict[str, tuple[float, Array]]:
+        motion = self._motion.motion(values)
+        try:
+            slopes = self._motion.slopes(motion, values)
+            integrals = dict(zip(self._integrands, slopes.integrals(), strict=True))
+            return {name: measured(one, motion.solution, slopes, integrals) for name, one in self._read.items()}
+        except SimulationError:  # no derivative just there: two extremes of one height, or a stop that is only touched
+            return {name: (one.of(motion.solution), self._differences(one, values)) for name, one in self._read.items()}
+
+    def _differences(self, measure: Measure, values: Mapping[str, float]) -> Array:
+        shares = []
+        for name, value in values.items():
+            step = 1e-4 * (abs(value) or 1.0)  # measures are known to some 1e-9
+            high, low = (
+                measure.of(self._motion.motion({**values, name: value + sign * step}).solution) for sign in (1.0, -1.0)
+            )
+            shares.append((high - low) / (2 * step))
+        return np.array(shares)
+
+    def _of_parameters(self, goal: Callable[[Mapping[str, float]], float], variables: Array) -> tuple[float, Array]:
+        def value(at: Array) -> float:
+            return float(goal({**self._fixed, **self.values(at)}))
+
+        steps = 1e-6 * np.where(variables == 0.0, 1.0, np.abs(variables))
+        shifts = np.diag(steps)
+        slopes = [(value(variables + shift) - value(variables - shift)) / 2 for shift in shifts]
+        return value(variables), np.array(slopes) / steps

@@ -1,0 +1,180 @@
+"""Design variables for which a goal becomes least, within limits of others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import product
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.stats import qmc
+
+from shaftwork.codegen.array_form.elements import Array
+from shaftwork.core.errors import ParameterError
+from shaftwork.core.parameters import whole
+from shaftwork.core.screen import progress
+from shaftwork.numerics.tolerances import EQUAL
+from shaftwork.optimization.measured_motion import Goal, MeasuredMotion
+from shaftwork.optimization.optimum import Attempt, Optimum
+from shaftwork.pipeline.arguments import checked_parameter, relative_tolerance, time_span
+from shaftwork.pipeline.network import Network, network_of, with_values
+from shaftwork.sweep.sweep_result import Limits
+
+OBJECTIVE = "objective"
+"""The name under which a function stands that is made least."""
+
+
+def optimize(
+    net: Network,
+    variables: Mapping[str, tuple[float, float]],
+    goal: Goal,
+    *,
+    t_end: float,
+    require: Mapping[str, Limits] | None = None,
+    functions: Mapping[str, Goal] | None = None,
+    choices: Mapping[str, Iterable[Mapping[str, float]]] | None = None,
+    maximize: bool = False,
+    starts: int = 1,
+    seed: int = 0,
+    initial: Mapping[str, float] | None = None,
+    rtol: float = 1e-6,
+) -> Optimum:
+    """Find values of design variables for which a measure of the motion becomes least, or largest.
+
+    Law: sequential quadratic programming (scipy's SLSQP) with the gradients of `motion_sensitivities`, exact through
+    all events, from the network's values and further starts that fill the ranges evenly. It finds the bottom of the
+    valley in which it starts: several starts that end alike are a sign, not a proof, that there is no deeper one.
+
+    Args:
+        net: the network.
+        variables: (low, high) by parameter.
+        goal: a measure, "max shaft.tau", or a function of all parameters, such as a mass or a price.
+        t_end: end of the motion, s.
+        require: (low, high) by measure, or by name of `functions`; None leaves a side open.
+        functions: of all parameters, by name, to be limited.
+        choices: parts of a catalogue: by name, sets of parameters of which one is taken; every combination is tried.
+        maximize: whether the goal is made largest.
+        starts: how many.
+        seed: of the further starts.
+        initial: start values of states.
+        rtol: relative tolerance of the gradients.
+
+    Raises:
+        ParameterError: an argument is out of its range, or a measure has no derivative.
+        SimulationError: there is no motion at a start.
+    """
+    ranges = _ranges(net, variables)
+    if whole(starts) is None:
+        raise ParameterError(f"starts = {starts!r} must be a whole number, 1 or more.")
+    limits = _limits(require, functions or {})
+    name = goal if isinstance(goal, str) else OBJECTIVE
+    goals = {name: goal, **{other: (functions or {}).get(other, other) for other in limits}}
+    _, end = time_span(0.0, t_end)
+    taken = _combinations(choices)
+    attempts: list[Attempt] = []
+    with progress(len(taken) * starts, "starts", "compiling") as show:
+        for choice, values in taken:
+            chosen = with_values(net, values) if values else net
+            motion = MeasuredMotion(chosen, tuple(ranges), goals, end, initial, relative_tolerance(rtol))
+            for start in _starts(chosen, ranges, starts, seed):
+                attempts.append(
+                    _attempt(motion, choice, values, start, ranges, limits, -1.0 if maximize else 1.0, name)
+                )
+                show(len(attempts), "optimize")
+    return Optimum(net, name, maximize, limits, tuple(attempts))
+
+
+def _ranges(net: Network, variables: Any) -> dict[str, tuple[float, float]]:
+    """Low and high by variable, in SI.
+
+    Raises:
+        ParameterError: there is no such parameter, or a range is none.
+    """
+    if not (isinstance(variables, Mapping) and variables):
+        raise ParameterError("Nothing is variable. Give ranges, such as {'shaft.c': (1e4, 5e4)}.")
+    netlist, ranges = network_of(net).netlist(), dict[str, tuple[float, float]]()
+    for name, span in variables.items():
+        if not (isinstance(span, Sequence) and not isinstance(span, str) and len(span) == 2):
+            raise ParameterError(f"'{name}': {span!r} is no range. Give (low, high).")
+        low, high = (checked_parameter(netlist, name, end) for end in span)
+        if not low < high:
+            raise ParameterError(f"'{name}': ({low:g}, {high:g}) is no range. The first must be less than the second.")
+        ranges[name] = low, high
+    return ranges
+
+
+def _limits(require: Mapping[str, Limits] | None, functions: Mapping[str, Goal]) -> dict[str, Limits]:
+    limits = dict(require or {})
+    for name, span in limits.items():
+        if not (isinstance(span, Sequence) and not isinstance(span, str) and len(span) == 2):
+            raise ParameterError(f"'{name}' must be within (low, high), None leaves a side open; not {span!r}.")
+    if unused := [name for name in functions if name not in limits]:
+        raise ParameterError(
+            f"'{unused[0]}' is a function without limits. Give require={{'{unused[0]}': (low, high)}}."
+        )
+    return limits
+
+
+def _combinations(
+    choices: Mapping[str, Iterable[Mapping[str, float]]] | None,
+) -> list[tuple[dict[str, int], dict[str, float]]]:
+    """The number taken of each catalogue, and all parameters that this sets."""
+    lists = {name: list(sets) for name, sets in (choices or {}).items()}
+    if empty := [name for name, sets in lists.items() if not sets]:
+        raise ParameterError(f"There is nothing to choose from in '{empty[0]}'.")
+    combinations = []
+    for numbers in product(*(range(len(sets)) for sets in lists.values())):
+        choice = dict(zip(lists, numbers, strict=True))
+        values = {key: value for name, number in choice.items() for key, value in lists[name][number].items()}
+        combinations.append((choice, values))
+    return combinations
+
+
+def _starts(net: Network, ranges: Mapping[str, tuple[float, float]], count: int, seed: int) -> list[Array]:
+    """The network's own values first, moved into their ranges."""
+    low, high = np.array(list(ranges.values())).T
+    parameters = net.compile().parameters
+    own = np.clip([parameters[name] for name in ranges], low, high)
+    further = qmc.Sobol(len(ranges), seed=seed).random_base2(max(count - 1, 1).bit_length())[: count - 1]
+    return [own, *(low + further * (high - low))]
+
+
+def _attempt(
+    motion: MeasuredMotion,
+    choice: Mapping[str, int],
+    fixed: Mapping[str, float],
+    start: Array,
+    ranges: Mapping[str, tuple[float, float]],
+    limits: Mapping[str, Limits],
+    sign: float,
+    name: str,
+) -> Attempt:
+    """One descent, in shares of the ranges; goals by their sizes at the start."""
+    low, high = np.array(list(ranges.values())).T
+    width, before = high - low, motion.motions
+    sizes = {goal: abs(value) or 1.0 for goal, (value, _) in motion.at(start).items()}
+
+    def side(of: str, factor: float, level: float = 0.0) -> dict[str, Any]:
+        def value(shares: Array) -> float:
+            return factor * (motion.at(low + shares * width)[of][0] - level) / sizes[of]
+
+        def slope(shares: Array) -> Array:
+            return np.asarray(factor * motion.at(low + shares * width)[of][1] * width / sizes[of])
+
+        return {"type": "ineq", "fun": value, "jac": slope}
+
+    sides = [(of, 1.0, ends[0]) for of, ends in limits.items()] + [(of, -1.0, ends[1]) for of, ends in limits.items()]
+    aim = side(name, sign)
+    found = minimize(
+        aim["fun"],
+        (start - low) / width,
+        jac=aim["jac"],
+        bounds=[(0.0, 1.0)] * len(ranges),
+        constraints=[side(of, factor, level) for of, factor, level in sides if level is not None],
+        method="SLSQP",
+        options={"ftol": EQUAL**1.5, "maxiter": 200},
+    )
+    variables = low + np.clip(found.x, 0.0, 1.0) * width
+    goals = {of: value for of, (value, _) in motion.at(variables).items()}
+    return Attempt(choice, {**fixed, **motion.values(variables)}, goals, str(found.message), motion.motions - before)

@@ -1,0 +1,122 @@
+"""What an optimisation has found: the best design, all descents, and which limits bind."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from shaftwork.core.errors import SimulationError
+from shaftwork.core.notebook import html_table
+from shaftwork.core.screen import counted
+from shaftwork.pipeline.network import Network, with_values
+from shaftwork.sweep.sweep_result import Limits
+
+
+@dataclass(frozen=True, eq=False)
+class Attempt:
+    """One descent.
+
+    Args:
+        choice: the number taken of each catalogue.
+        values: of variables and of what was chosen, in SI.
+        goals: by name.
+        message: why it ended.
+        motions: computed for it.
+    """
+
+    choice: Mapping[str, int]
+    values: Mapping[str, float]
+    goals: Mapping[str, float]
+    message: str
+    motions: int
+
+
+@dataclass(frozen=True, eq=False)
+class Optimum:
+    """The best design that was found.
+
+    Args:
+        network: before.
+        goal: what was made least or largest.
+        maximize: whether largest.
+        require: limits by goal.
+        attempts: all descents.
+    """
+
+    network: Network
+    goal: str
+    maximize: bool
+    require: Mapping[str, Limits]
+    attempts: tuple[Attempt, ...]
+
+    def meets(self, attempt: Attempt) -> bool:
+        """Whether a design is within all limits, to a millionth of their size."""
+        for name, (low, high) in self.require.items():
+            value = attempt.goals[name]
+            margin = 1e-6 * max(abs(value), *(abs(end) for end in (low, high) if end is not None), 0.0)
+            if not (low is None or value >= low - margin) or not (high is None or value <= high + margin):
+                return False
+        return bool(np.isfinite(attempt.goals[self.goal]))
+
+    @cached_property
+    def best(self) -> Attempt:
+        """The best of those that meet all limits.
+
+        Raises:
+            SimulationError: none does.
+        """
+        good = [attempt for attempt in self.attempts if self.meets(attempt)]
+        if not good:
+            raise SimulationError(
+                f"None of {counted(len(self.attempts), 'descent')} meets all limits: {self._nearest}. Widen a range or "
+                "a limit, or take more starts."
+            )
+        return (max if self.maximize else min)(good, key=lambda attempt: attempt.goals[self.goal])
+
+    @property
+    def _nearest(self) -> str:
+        return "; ".join(
+            f"{name} must be within {limits} and is from {min(a.goals[name] for a in self.attempts):.6g} to "
+            f"{max(a.goals[name] for a in self.attempts):.6g}"
+            for name, limits in self.require.items()
+        )
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Variables and chosen parameters of the best design, in SI."""
+        return dict(self.best.values)
+
+    @property
+    def designed(self) -> Network:
+        """The network of the best design."""
+        return with_values(self.network, self.values)
+
+    def _rows(self) -> tuple[str, list[str], list[list[str]]]:
+        best, verb = self.best, "largest" if self.maximize else "least"
+        title = (
+            f"{self.network.name}: {self.goal} {verb} at {best.goals[self.goal]:.6g}, by "
+            f"{counted(len(self.attempts), 'descent')} and {sum(a.motions for a in self.attempts)} motions"
+        )
+        rows = [[name, f"{value:.6g}", ""] for name, value in best.values.items()]
+        rows += [[name, f"{value:.6g}", self._said(name)] for name, value in best.goals.items()]
+        rows += [[name, f"number {number}", "chosen"] for name, number in best.choice.items()]
+        return title, ["", "best", ""], rows
+
+    def _said(self, name: str) -> str:
+        if name not in self.require:
+            return "goal"
+        low, high = self.require[name]
+        words = [f"at least {low:g}"] if low is not None else []
+        return " and ".join([*words, *([f"at most {high:g}"] if high is not None else [])])
+
+    def __str__(self) -> str:
+        title, _, rows = self._rows()
+        widths = [max(len(row[column]) for row in rows) for column in range(2)]
+        lines = [f"{name:{widths[0]}}  {value:>{widths[1]}}  {said}".rstrip() for name, value, said in rows]
+        return "\n".join([title, *lines])
+
+    def _repr_html_(self) -> str:
+        return html_table(*self._rows())

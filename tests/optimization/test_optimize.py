@@ -1,0 +1,124 @@
+"""Optimal designs that are known in closed form, and limits that bind."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import shaftwork as sw
+
+LIGHT, HEAVY = {"motor.tau": 2.0, "JM.J": 0.01}, {"motor.tau": 3.0, "JM.J": 0.04}
+
+
+def axis() -> sw.Network:
+    """Its load has turned up to i tau t / (J_L + i^2 J_M), which is largest at i = sqrt(J_L / J_M) = 20."""
+    net = sw.Network("axis")
+    net.add(sw.TorqueSource("motor", tau=2.0), "rotor")
+    net.add(sw.Inertia("JM", J=0.01), "rotor")
+    net.add(sw.Gear("gear", ratio=5.0), "rotor", "drum")
+    net.add(sw.Inertia("JL", J=4.0), "drum")
+    return net
+
+
+def test_the_ratio_of_the_largest_acceleration_matches_the_inertias() -> None:
+    best = sw.optimize(axis(), {"gear.ratio": (2.0, 60.0)}, "end JL.omega", t_end=1.0, maximize=True)
+    assert best.values["gear.ratio"] == pytest.approx(20.0, rel=1e-4)  # flat there: half of the digits
+    assert best.best.goals["end JL.omega"] == pytest.approx(20.0 * 2.0 / 8.0, rel=1e-8)
+    assert best.designed.compile().parameters["gear.ratio"] == best.values["gear.ratio"]
+
+
+def test_a_limit_that_binds_is_kept() -> None:
+    # the motor turns i times as fast: i^2 tau / (J_L + i^2 J_M) = 80 at i^2 = 80 J_L / (tau - 80 J_M)
+    best = sw.optimize(
+        axis(),
+        {"gear.ratio": (2.0, 60.0)},
+        "end JL.omega",
+        t_end=1.0,
+        maximize=True,
+        require={"max JM.omega": (None, 80.0)},
+        starts=3,
+    )
+    assert best.values["gear.ratio"] == pytest.approx((80 * 4.0 / (2.0 - 0.8)) ** 0.5, rel=1e-6)
+    assert best.best.goals["max JM.omega"] <= 80.0 * (1 + 1e-6)
+    assert "at most 80" in str(best)
+
+
+def test_of_a_catalogue_the_better_motor_is_taken() -> None:
+    best = sw.optimize(
+        axis(),
+        {"gear.ratio": (2.0, 60.0)},
+        "end JL.omega",
+        t_end=1.0,
+        maximize=True,
+        choices={"motor": [LIGHT, HEAVY]},
+    )
+    # tau / (2 sqrt(J_L J_M)): 5.0 of the light one, 3.75 of the heavy one
+    assert best.best.choice == {"motor": 0}
+    assert [attempt.goals["end JL.omega"] for attempt in best.attempts] == pytest.approx([5.0, 3.75], rel=1e-7)
+
+
+def test_a_price_becomes_least_within_what_the_motion_must_do() -> None:
+    best = sw.optimize(
+        axis(),
+        {"motor.tau": (0.5, 10.0), "gear.ratio": (2.0, 60.0)},
+        lambda values: values["motor.tau"] ** 2,
+        t_end=1.0,
+        require={"end JL.omega": (6.0, None)},
+    )
+    assert best.values["gear.ratio"] == pytest.approx(20.0, rel=1e-3)
+    assert best.values["motor.tau"] == pytest.approx(6.0 * 8.0 / 20.0, rel=1e-6)
+
+
+def test_a_function_of_parameters_can_be_limited() -> None:
+    best = sw.optimize(
+        axis(),
+        {"gear.ratio": (2.0, 60.0)},
+        "end JL.omega",
+        t_end=1.0,
+        maximize=True,
+        functions={"size": lambda values: 0.1 * values["gear.ratio"] ** 2},
+        require={"size": (None, 14.4)},
+    )
+    assert best.values["gear.ratio"] == pytest.approx(12.0, rel=1e-6)
+
+
+def test_a_motion_through_phases_is_no_worse_than_a_grid() -> None:
+    net = sw.scenes.six_phases()
+    spans = {"shaft.c": (1e4, 4e4), "shaft.d": (5.0, 60.0)}
+    best = sw.optimize(net, spans, "max shaft.tau", t_end=3.0, starts=3)
+    grid = sw.studies.sweep(
+        net,
+        {name: np.linspace(low, high, 5) for name, (low, high) in spans.items()},
+        t_end=3.0,
+        measures=["max shaft.tau"],
+    )
+    assert best.best.goals["max shaft.tau"] <= grid.measures["max shaft.tau"].min() * (1 + 1e-6)
+
+
+def test_where_no_design_meets_the_limits_the_error_says_how_near_they_came() -> None:
+    made = sw.optimize(
+        axis(), {"gear.ratio": (2.0, 60.0)}, "max JM.omega", t_end=1.0, require={"end JL.omega": (9.0, None)}
+    )
+    with pytest.raises(sw.SimulationError, match=r"end JL\.omega must be within"):
+        _ = made.best
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"variables": {}}, "Nothing is variable"),
+        ({"variables": {"gear.ratio": 3.0}}, "is no range"),
+        ({"variables": {"gear.ratio": (3.0, 2.0)}}, "is no range"),
+        ({"variables": {"gear.i": (3.0, 2.0)}}, "no parameter 'gear.i'"),
+        ({"goal": "JL.omega"}, "is no measure"),
+        ({"goal": "damage JL.omega"}, "no derivative"),
+        ({"starts": 0}, "starts = 0"),
+        ({"require": {"end JL.omega": 3.0}}, "must be within"),
+        ({"functions": {"size": len}}, "a function without limits"),
+        ({"choices": {"motor": []}}, "nothing to choose"),
+    ],
+)
+def test_what_is_wrong_is_said(change: dict[str, object], words: str) -> None:
+    arguments: dict[str, object] = {"variables": {"gear.ratio": (2.0, 60.0)}, "goal": "end JL.omega", **change}
+    with pytest.raises(sw.ParameterError, match=words):
+        sw.optimize(axis(), t_end=1.0, **arguments)  # type: ignore[arg-type]
