@@ -33,7 +33,7 @@ USES = {
     "spectra": "net.simulate(0.1).spectrum('shaft.tau')",
     "reporting": "sw.report(net, sections=['parts'])",
     "torsional": "sw.torsional.Section",
-    "uncertainty": "at('uncertainty.uncertainty').uncertainty(net, {'shaft.c': (90, 110)}, t_end=0.1, measures=['end J2.omega'], samples=2)",
+    "uncertainty": "at('uncertainty.bands').bands(net, 'J2.omega', [0, 0.1], {'shaft.c': (90, 110)}, samples=2)",
     "optimization": "sw.optimize(net, {'shaft.c': (90, 110)}, 'max shaft.tau', t_end=0.1)",
     "fitting": "sw.fit(net, {'t': [0.1, 0.2], 'J2.omega': [0.1, 0.2]}, ['shaft.c'])",
     "live": "sw.live.Session(net, t_end=0.1)",

@@ -10,8 +10,10 @@ from __future__ import annotations
 import json
 import os
 import signal
+import sqlite3
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -37,9 +39,13 @@ def swept(store: Path | None) -> sw.studies.Sweep:
 
 
 def stored(store: Path) -> list[int]:
-    """The variants in all whole lines but the first, each as often as it stands there."""
-    whole = store.read_bytes().split(b"\n")[1:-1] if store.exists() else []
-    return [variant for line in whole for variant in json.loads(line)["variants"]]
+    """The variants of all chunks, each as often as it stands there."""
+    if not store.exists():
+        return []
+    with closing(sqlite3.connect(store)) as database:
+        tables = database.execute("SELECT name FROM sqlite_master WHERE name = 'chunks'").fetchall()
+        rows = database.execute("SELECT variants FROM chunks").fetchall() if tables else []
+    return [variant for (numbers,) in rows for variant in np.frombuffer(numbers, dtype="<i8").tolist()]
 
 
 def main(store: Path) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import pickle
 import sys
 from collections.abc import Iterable
@@ -305,9 +304,6 @@ def test_a_sweep_that_was_stopped_goes_on_to_identical_results(tmp_path: Path, m
     call = {"samples": {"shaft.c": np.linspace(500.0, 900.0, 20)}, "t_end": 0.2, "engine": "scipy"}
     call |= {"measures": ["max shaft.tau", "end J.omega"]}
     stopped(path, monkeypatch, 1, **call)
-    assert len(path.read_text().splitlines()) == 2
-    with path.open("a") as file:
-        file.write('{"variants": [8, 9')  # killed while it wrote
     done: list[int] = []
     run = Worker.run
     with monkeypatch.context() as patch:
@@ -319,7 +315,6 @@ def test_a_sweep_that_was_stopped_goes_on_to_identical_results(tmp_path: Path, m
         np.testing.assert_array_equal(resumed.measures[name], values)
     again = sweep(swing(), store=path, require={"end J.omega": (0.0, None)}, **call)  # type: ignore[arg-type]
     np.testing.assert_array_equal(again.measures["max shaft.tau"], whole.measures["max shaft.tau"])
-    assert all(json.loads(line) for line in path.read_text().splitlines())
 
 
 @pytest.mark.parametrize(
@@ -349,7 +344,7 @@ def test_a_store_of_another_network_and_what_is_no_store_are_refused(tmp_path: P
     (tmp_path / "b").write_text("c = 3\n")
     with pytest.raises(sw.ParameterError, match="is no file of a sweep"):
         sweep(swing(), store=tmp_path / "b", **call)  # type: ignore[arg-type]
-    with pytest.raises(sw.ParameterError, match="cannot be used: No such file or directory"):
+    with pytest.raises(sw.ParameterError, match="cannot be used: unable to open database file"):
         sweep(swing(), store=tmp_path / "missing" / "c", **call)  # type: ignore[arg-type]
 
 

@@ -1,16 +1,16 @@
-"""The file of a sweep: what is damaged in it is named with its line, and nothing that is no sweep's is written over."""
+"""The file of a sweep: what is damaged in it is computed anew or named, and nothing else is written over."""
 
 from __future__ import annotations
 
-import json
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 import shaftwork as sw
-from shaftwork.sweep.sweep_store import check_of
 
 STIFFNESSES = np.linspace(500.0, 900.0, 20)
 """More than two chunks of variants that run one by one."""
@@ -33,107 +33,83 @@ def swept(store: Path | None) -> sw.studies.Sweep:
     )
 
 
+@contextmanager
+def opened(path: Path) -> Iterator[sqlite3.Connection]:
+    with closing(sqlite3.connect(path)) as database, database:
+        yield database
+
+
 @pytest.fixture(scope="module")
-def lines(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
-    """Of a whole file: what the sweep is, and three chunks."""
-    path = tmp_path_factory.mktemp("store") / "whole.jsonl"
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("store") / "whole.sqlite"
     swept(path)
-    made = path.read_text().splitlines()
-    assert len(made) == 4
-    return made
+    with opened(path) as database:
+        assert database.execute("SELECT count(*) FROM chunks").fetchone() == (3,)
+    return path
 
 
-@pytest.fixture(scope="module")
-def whole() -> dict[str, np.ndarray]:
-    """The measures of the sweep without a store."""
-    return swept(None).measures
+def copied(whole: Path, path: Path) -> Path:
+    path.write_bytes(whole.read_bytes())
+    return path
 
 
-def chunk(**changes: Any) -> str:
-    whole = {"variants": [0, 1], "values": [[1.0, 2.0], [3.0, 4.0]], "reasons": ["", ""], "left": 0} | changes
-    made = {key: value for key, value in whole.items() if value != "no"}
-    return json.dumps(made | {"check": check_of(made)})
+def test_a_whole_file_gives_the_measures_to_the_last_bit(whole: Path, tmp_path: Path) -> None:
+    again = swept(copied(whole, tmp_path / "store.sqlite"))
+    for name, values in swept(None).measures.items():
+        np.testing.assert_array_equal(again.measures[name], values)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("line", "says"),
+    "change",
     [
-        ('{"variants": [0, 1], "val', "it is not whole"),
-        ("", "it is not whole"),
-        ("\x00" * 40, "it is not whole"),
-        ("\xfc\xff", "it is not whole"),
-        ("[" * 100_000, "it is not whole"),
-        ("[]", "no chunk of a sweep"),
-        ("3", "no chunk of a sweep"),
-        ("{}", "it lacks 'variants', 'values', 'reasons'"),
-        (chunk(values="no"), "it lacks 'values'"),
-        (chunk(variants=[0, 20]), "different whole numbers from 0 to 19"),
-        (chunk(variants=[-1, 0]), "different whole numbers from 0 to 19"),
-        (chunk(variants=[1, 1]), "different whole numbers from 0 to 19"),
-        (chunk(variants=[0.5, 1]), "different whole numbers from 0 to 19"),
-        (chunk(variants=[True, 0]), "different whole numbers from 0 to 19"),
-        (chunk(variants={"0": 1}), "different whole numbers from 0 to 19"),
-        (chunk(values=[[1.0, 2.0]]), "not 2 numbers for each of its 2 variants"),
-        (chunk(values=[[1.0], [2.0]]), "not 2 numbers for each of its 2 variants"),
-        (chunk(values=[1.0, 2.0]), "not 2 numbers for each of its 2 variants"),
-        (chunk(values=[[1.0, "2"], [3.0, 4.0]]), "not 2 numbers for each of its 2 variants"),
-        (chunk(values=[[1.0, float("nan")], [3.0, 4.0]]), "not 2 numbers for each of its 2 variants"),
-        (chunk(values=[[1.0, 10**400], [3.0, 4.0]]), "not 2 numbers for each of its 2 variants"),
-        (chunk(reasons=[""]), "not a text for each of its 2 variants"),
-        (chunk(reasons=["", None]), "not a text for each of its 2 variants"),
-        (chunk(left=3), "'left' is not a whole number from 0 to 2"),
-        (chunk().replace("4.0", "5.0"), "its digits are not those that were written"),
+        "UPDATE chunks SET alone = alone + 1 WHERE number = 2",
+        'UPDATE chunks SET reasons = \'{"0": "no"}\' WHERE number = 2',
+        "UPDATE chunks SET measured = zeroblob(128) WHERE number = 2",
+        "UPDATE chunks SET variants = zeroblob(64) WHERE number = 2",
     ],
 )
-def test_a_damaged_line_is_named_and_without_it_the_sweep_goes_on(
-    tmp_path: Path, lines: list[str], whole: dict[str, np.ndarray], line: str, says: str
-) -> None:
-    """What the line had is computed anew, to the same digits."""
-    path = tmp_path / "store.jsonl"
-    path.write_bytes("\n".join([*lines[:2], line, lines[3], ""]).encode("latin-1"))
-    before = path.read_bytes()
-    with pytest.raises(sw.ParameterError, match=r"store\.jsonl' is damaged in line 3: .*Delete this line") as caught:
-        swept(path)
-    assert says in str(caught.value)
-    assert path.read_bytes() == before
-    path.write_text("\n".join([*lines[:2], lines[3], ""]))
-    resumed = swept(path)
-    for name, values in whole.items():
+def test_a_chunk_that_was_changed_is_computed_anew_with_a_warning(whole: Path, tmp_path: Path, change: str) -> None:
+    path = copied(whole, tmp_path / "store.sqlite")
+    with opened(path) as database:
+        database.execute(change)
+    with pytest.warns(sw.AccuracyWarning, match=r"store\.sqlite': chunk 2 is damaged, and its variants are computed"):
+        resumed = swept(path)
+    for name, values in swept(None).measures.items():
         np.testing.assert_array_equal(resumed.measures[name], values)
+    assert swept(path).measures["end J.omega"].tobytes() == resumed.measures["end J.omega"].tobytes()
 
 
-@pytest.mark.parametrize("text", ["[1]\n", "5\n", "null\n", "{}\n", "remarks, without an end of line", '{"format": 1}'])
+@pytest.mark.parametrize("text", ["[1]\n", '{"format": 2, "network": "swing"}\n', "remarks\n" * 200])
 def test_what_is_no_file_of_a_sweep_is_refused_and_stays_as_it_is(tmp_path: Path, text: str) -> None:
     path = tmp_path / "other.txt"
     path.write_text(text)
-    with pytest.raises(sw.ParameterError, match=r"other\.txt' (is no file of a sweep: line 1|holds another sweep)"):
+    with pytest.raises(sw.ParameterError, match=r"other\.txt' is no file of a sweep"):
         swept(path)
     assert path.read_text() == text
 
 
-@pytest.mark.parametrize(("version", "told"), [("0.0.9", "version 0.0.9"), (None, "an earlier version")])
-def test_a_store_of_another_version_is_refused_and_stays_as_it_is(
-    tmp_path: Path, lines: list[str], version: str | None, told: str
-) -> None:
-    title = json.loads(lines[0])
-    assert title.pop("version") == sw.__version__
-    path = tmp_path / "store.jsonl"
-    path.write_text("\n".join([json.dumps(title | ({"version": version} if version else {})), *lines[1:], ""]))
+def test_the_database_of_something_else_is_refused_and_stays_as_it_is(tmp_path: Path) -> None:
+    path = tmp_path / "other.sqlite"
+    with opened(path) as database:
+        database.execute("CREATE TABLE prices (part TEXT, price REAL)")
     before = path.read_bytes()
-    with pytest.raises(sw.ParameterError, match=f"begun by {told} of Shaftwork, and this is {sw.__version__}"):
+    with pytest.raises(sw.ParameterError, match=r"other\.sqlite' is a database of something else"):
         swept(path)
     assert path.read_bytes() == before
 
 
-def test_a_heading_that_was_cut_off_is_written_anew(tmp_path: Path, lines: list[str]) -> None:
-    path = tmp_path / "store.jsonl"
-    path.write_text(lines[0][:30])
-    swept(path)
-    assert path.read_text().splitlines() == lines
+def test_a_store_of_another_version_is_refused(whole: Path, tmp_path: Path) -> None:
+    path = copied(whole, tmp_path / "store.sqlite")
+    with opened(path) as database:
+        assert database.execute("SELECT value FROM sweep WHERE what = 'version'").fetchone() == (sw.__version__,)
+        database.execute("UPDATE sweep SET value = '0.0.9' WHERE what = 'version'")
+    with pytest.raises(
+        sw.ParameterError, match=rf"begun by version 0\.0\.9 of Shaftwork, and this is {sw.__version__}"
+    ):
+        swept(path)
 
 
-def test_variants_that_two_calls_have_both_stored_count_once(tmp_path: Path) -> None:
+def test_variants_that_are_stored_twice_count_once(tmp_path: Path) -> None:
     pytest.importorskip("heyoka")
     net = sw.Network("swing")
     net.add(sw.TorqueSource("motor", tau=5.0), "a")
@@ -145,10 +121,11 @@ def test_variants_that_two_calls_have_both_stored_count_once(tmp_path: Path) -> 
     def resumed() -> sw.studies.Sweep:
         return sw.studies.sweep(net, samples={"shaft.d": damping}, t_end=0.1, measures=["end J.omega"], store=path)
 
-    path = tmp_path / "store.jsonl"
+    path = tmp_path / "store.sqlite"
     whole = resumed()
-    title, *chunks = path.read_text().splitlines()
-    path.write_text("\n".join([title, *chunks, *chunks, ""]))
+    with opened(path) as database:
+        columns = "variants, measured, reasons, alone, digest"
+        database.execute(f"INSERT INTO chunks ({columns}) SELECT {columns} FROM chunks")  # noqa: S608 (names above)
     again = resumed()
     assert again.why == whole.why
     assert again.why.startswith("1 of 16 variants ran one by one")

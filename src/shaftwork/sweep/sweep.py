@@ -57,6 +57,7 @@ def sweep(
     steady: bool = False,
     t_eval: OutputTimes = None,
     processes: int | None = None,
+    on: Any = None,
     store: str | Path | None = None,
 ) -> Sweep:
     """Simulate variants of a network and measure each of them; nothing is compiled anew.
@@ -84,6 +85,7 @@ def sweep(
         t_eval: output times of the solutions that functions get, as there; names measure the motion, not the outputs.
         processes: how many; by default as many as there are cores, where the sweep takes long enough. Variants side by
             side are divided only then: in the seconds that a process needs to start, 50 000 are done.
+        on: a client of Dask, `distributed.Client(...)`, whose workers do all of it (extra `cluster`).
         store: a file to which all that is done is appended. The same call with the same file goes on where it stopped.
 
     Raises:
@@ -100,7 +102,7 @@ def sweep(
     options = _options(readers, rtol, engine, start, t_eval)
     count = _count(processes)
     task = Task(net, columns, readers, _lines(sn, readers), end, options, steady)
-    values, reasons, why = _run(task, count, store)
+    values, reasons, why = _run(task, count, on, store)
     return Sweep(net.name, columns, dict(zip(readers, values.T, strict=True)), limits, reasons, why)
 
 
@@ -131,7 +133,7 @@ def _count(processes: int | None) -> int | None:
     return None if processes is None else count
 
 
-def _run(task: Task, processes: int | None, path: str | Path | None) -> tuple[Array, tuple[str, ...], str]:
+def _run(task: Task, processes: int | None, on: Any, path: str | Path | None) -> tuple[Array, tuple[str, ...], str]:
     """(variants, measures), why variants failed, and why some or all ran one by one."""
     worker = Worker(task)
     values, reasons = np.full((len(task), len(task.measures)), np.nan), [""] * len(task)
@@ -150,7 +152,7 @@ def _run(task: Task, processes: int | None, path: str | Path | None) -> tuple[Ar
         for chunk in store.chunks if store else []:
             take(chunk)
         with progress(len(task), "variants", "compiling") as show:
-            for chunk in chunks(worker, task, np.flatnonzero(open_), processes):
+            for chunk in chunks(worker, task, np.flatnonzero(open_), processes, on):
                 if store:
                     store.append(chunk)
                 take(chunk)

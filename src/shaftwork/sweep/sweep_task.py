@@ -85,6 +85,10 @@ class Task:
         """The parameters of a variant that differ from the network's."""
         return {name: float(column[variant]) for name, column in self.columns.items()}
 
+    def rows(self, variants: Any) -> dict[str, Array]:
+        """The columns of some variants."""
+        return {name: column[variants] for name, column in self.columns.items()}
+
 
 @dataclass(frozen=True, eq=False)
 class Chunk:
@@ -161,52 +165,57 @@ class Worker:
                 self.why = "the first of them fails, and the network as it is too"
         return None
 
-    def run(self, variants: NDArray[np.intp]) -> Chunk:
-        """Measures of some variants."""
+    def run(self, variants: NDArray[np.intp], rows: Mapping[str, Array] | None = None) -> Chunk:
+        """Measures of some variants.
+
+        Args:
+            variants: their numbers.
+            rows: their columns, where the sweep of this worker has not all of them.
+        """
+        rows = self._task.rows(variants) if rows is None else rows
         values = np.full((variants.size, len(self._task.measures)), np.nan)
-        reasons = [self._objection(variant) if self._choosy else "" for variant in variants.tolist()]
+        reasons = [self._objection(row, rows) if self._choosy else "" for row in range(variants.size)]
         open_ = np.array([not reason for reason in reasons])
         if self._ensemble is not None and open_.any():
             here = np.flatnonzero(open_)
-            columns = np.array([column[variants[here]] for column in self._task.columns.values()])
-            measured, done = self._ensemble.run(columns)
+            measured, done = self._ensemble.run(np.array([column[here] for column in rows.values()]))
             values[here[done]] = measured[:, done].T
             open_[here[done]] = False
         left = 0 if self._ensemble is None else int(open_.sum())
         for row in np.flatnonzero(open_).tolist():
-            values[row], reasons[row] = self._alone(int(variants[row]))
+            values[row], reasons[row] = self._alone({name: float(column[row]) for name, column in rows.items()})
         return Chunk(variants, values, tuple(reasons), left)
 
     @cached_property
-    def _choosy(self) -> list[tuple[Component, list[tuple[str, Array]]]]:
-        """Parts that check whether their values go together, with the columns of those that vary.
+    def _choosy(self) -> list[tuple[Component, list[tuple[str, str]]]]:
+        """Parts that check whether their values go together, with those that vary and the names of their columns.
 
         Left out are those whose check reads nothing that varies: it says the same of all variants as of the network.
         """
-        by_part: dict[str, list[tuple[str, Array]]] = {}
-        for name, column in self._task.columns.items():
+        by_part: dict[str, list[tuple[str, str]]] = {}
+        for name in self._task.columns:
             owner, _, parameter = name.rpartition(".")
-            by_part.setdefault(owner, []).append((parameter, column))
+            by_part.setdefault(owner, []).append((parameter, name))
         parts = (placed.part for placed in self._netlist.placed)
         varied = [(part, by_part[part.name]) for part in parts if part.name in by_part]
         return [(part, table) for part, table in varied if not _checked(part).isdisjoint({"__dict__", *dict(table)})]
 
-    def _objection(self, variant: int) -> str:
-        """Why the values of a variant do not go together; empty where they do."""
+    def _objection(self, row: int, rows: Mapping[str, Array]) -> str:
+        """Why the values in a row of columns do not go together; empty where they do."""
         for part, columns in self._choosy:
             changed: Any = object.__new__(type(part))  # its values have been looked at one by one
             vars(changed).update(vars(part))
-            vars(changed).update({parameter: float(column[variant]) for parameter, column in columns})
+            vars(changed).update({parameter: float(rows[name][row]) for parameter, name in columns})
             try:
                 changed.__post_init__()
             except ParameterError as error:
                 return in_one_line(error)
         return ""
 
-    def _alone(self, variant: int) -> tuple[Array, str]:
+    def _alone(self, parameters: Mapping[str, float]) -> tuple[Array, str]:
         """Measures of one variant, and why it failed."""
         task, nothing = self._task, np.full(len(self._task.measures), np.nan)
-        parameters, options = task.values(variant), dict(task.options)
+        options = dict(task.options)
         try:
             if task.steady:
                 options["initial"] = steady_start(self._model, options["initial"] or {}, parameters)
@@ -257,7 +266,7 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def chunks(worker: Worker, task: Task, variants: Index, processes: int | None) -> Iterator[Chunk]:
+def chunks(worker: Worker, task: Task, variants: Index, processes: int | None, on: Any = None) -> Iterator[Chunk]:
     """Chunks as they are done.
 
     Args:
@@ -266,10 +275,16 @@ def chunks(worker: Worker, task: Task, variants: Index, processes: int | None) -
         variants: (k,) what is to be done.
         processes: how many; None for as many as there are cores. Variants side by side take to them only where what is
             left takes long enough, others also where so many are asked for.
+        on: a client of Dask, whose workers do it; None for this machine.
     """
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         sys.exit(1)  # a script without a guard, run again by a process that it has started: the first one says so
     parts = [variants[first : first + worker.chunk] for first in range(0, variants.size, worker.chunk)]
+    if on is not None:
+        from shaftwork.sweep.cluster import on_cluster
+
+        yield from on_cluster(task, parts, on)
+        return
     count = processes if processes is not None else cores() if _can_be_sent(task) else 1
     if processes is not None and count > 1 and worker.why:
         yield from _in_processes(task, parts, count)
