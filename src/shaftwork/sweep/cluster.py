@@ -32,40 +32,61 @@ def on_cluster(task: Task, parts: Sequence[Index], client: Any) -> Iterator[Chun
     distributed = imported("distributed", "cluster", "sweep(on=...)")
     if not isinstance(client, distributed.Client):
         raise ParameterError(f"on = {client!r} must be a client of Dask: distributed.Client(...).")
-    key, head = uuid4().hex, replace(task, columns=task.rows(slice(0, SIDE_BY_SIDE)))
-    # a call over a network costs some milliseconds: eight chunks of one process are worth that
-    calls = [np.concatenate(parts[first : first + 8]) for first in range(0, len(parts), 8)]
-    losses, rest = dict[int, int](), list(reversed(list(enumerate(calls))))
-    running = distributed.as_completed()
-    numbers: dict[Any, int] = {}
-
-    def submit() -> None:
-        # a cluster may grow meanwhile
-        while rest and len(numbers) < 2 * max(1, sum(client.nthreads().values())):
-            number, part = rest.pop()
-            future = client.submit(_measured, key, head, part, task.rows(part), pure=False, retries=0)
-            numbers[future] = number
-            running.add(future)
-
+    calls = _Calls(task, parts, client, distributed.as_completed())
+    lost = distributed.KilledWorker, distributed.client.FutureCancelledError
     try:
-        submit()
-        for future in running:
-            number = numbers.pop(future)
+        calls.submit()
+        for future in calls.completed:
+            variants = calls.waiting.pop(future)
             try:
                 chunk = future.result()
-            except (distributed.KilledWorker, distributed.client.FutureCancelledError) as error:
-                losses[number] = losses.get(number, 0) + 1
-                if losses[number] > 20:  # workers that are lost for other reasons are not lost so often with one chunk
-                    raise SimulationError(
-                        f"Workers of the cluster were lost {losses[number]} times with variants {calls[number][0]} to "
-                        f"{calls[number][-1]}: {error}. Their logs tell why; memory is the most common reason."
-                    ) from error
-                rest.append((number, calls[number]))
+            except lost as error:
+                calls.again(variants, error)
             else:
                 yield chunk
-            submit()
+            calls.submit()
     finally:
-        client.cancel(list(numbers))
+        client.cancel(list(calls.waiting))
+
+
+class _Calls:
+    """What waits on a cluster, and what is to follow.
+
+    Args:
+        task: the sweep.
+        parts: variants of each chunk.
+        client: of Dask.
+        completed: its futures, as they are done.
+    """
+
+    def __init__(self, task: Task, parts: Sequence[Index], client: Any, completed: Any) -> None:
+        self._task, self._client, self.completed = task, client, completed
+        self._key, self._head = uuid4().hex, replace(task, columns=task.rows(slice(0, SIDE_BY_SIDE)))
+        # a call over a network costs some milliseconds: eight chunks of one process are worth that
+        self._rest = [np.concatenate(parts[first : first + 8]) for first in range(0, len(parts), 8)][::-1]
+        self._losses: dict[int, int] = {}
+        self.waiting: dict[Any, Index] = {}
+        """Variants by future."""
+
+    def submit(self) -> None:
+        """Send as much as keeps the cluster busy, which may grow meanwhile."""
+        while self._rest and len(self.waiting) < 2 * max(1, sum(self._client.nthreads().values())):
+            variants = self._rest.pop()
+            rows = self._task.rows(variants)
+            future = self._client.submit(_measured, self._key, self._head, variants, rows, pure=False)
+            self.waiting[future] = variants
+            self.completed.add(future)
+
+    def again(self, variants: Index, error: Exception) -> None:
+        """Send what was lost with a worker once more."""
+        first = int(variants[0])
+        self._losses[first] = count = self._losses.get(first, 0) + 1
+        if count > 20:  # workers that are lost for other reasons are not lost so often with one call
+            raise SimulationError(
+                f"Workers of the cluster were lost {count} times with variants {first} to {variants[-1]}: {error}. "
+                "Their logs tell why; memory is the most common reason."
+            ) from error
+        self._rest.append(variants)
 
 
 def _measured(key: str, head: Task, part: Index, rows: Mapping[str, Array]) -> Chunk:

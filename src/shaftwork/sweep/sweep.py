@@ -83,8 +83,7 @@ def sweep(
         initial: start values, or a motion that each variant goes on from, as there.
         steady: whether each variant starts in its own steady state at t = 0, of which `initial` changes some values.
         t_eval: output times of the solutions that functions get, as there; names measure the motion, not the outputs.
-        processes: how many; by default as many as there are cores, where the sweep takes long enough. Variants side by
-            side are divided only then: in the seconds that a process needs to start, 50 000 are done.
+        processes: how many; by default as many as there are cores, where the sweep takes long enough.
         on: a client of Dask, `distributed.Client(...)`, whose workers do all of it (extra `cluster`).
         store: a file to which all that is done is appended. The same call with the same file goes on where it stopped.
 
@@ -100,9 +99,8 @@ def sweep(
     limits = _limits(require, readers)
     _, end = time_span(time_of_start(None, start), t_end)
     options = _options(readers, rtol, engine, start, t_eval)
-    count = _count(processes)
     task = Task(net, columns, readers, _lines(sn, readers), end, options, steady)
-    values, reasons, why = _run(task, count, on, store)
+    values, reasons, why = _run(task, _count(processes), on, store)
     return Sweep(net.name, columns, dict(zip(readers, values.T, strict=True)), limits, reasons, why)
 
 
