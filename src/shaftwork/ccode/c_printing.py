@@ -135,7 +135,7 @@ def _in_pieces(expression: Expr) -> Expr:
 def function(head: str, lines: Sequence[str]) -> str:
     """A static C function; arguments that its lines do not read are marked as unused."""
     names = [argument.split("*")[-1].split(" ")[-1] for argument in head[head.index("(") + 1 : -1].split(", ")]
-    words = {word for line in lines for word in re.findall(r"\w+", line)}
+    words = {word for line in lines for word in re.findall(r"(?<!->)\b\w+", line)}
     unused = [f"(void){name};" for name in names if name not in words]
     return "\n".join([f"static {head}", "{", *(f"    {line}" for line in (*unused, *lines)), "}", ""])
 

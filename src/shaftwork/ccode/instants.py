@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from sympy import Abs, Expr, Max, Min, Mul, Piecewise, Pow, Symbol, asin, cos, floor, pi, simplify, sin
+from sympy import Abs, Expr, Float, Integer, Max, Min, Mul, Piecewise, Pow, Symbol, asin, cos, floor, pi, simplify, sin
 
 from shaftwork.ccode.c_printing import Statements, array, function
 from shaftwork.components.discontinuities import line, narrow_places, switches, unsolved_places
@@ -39,6 +39,11 @@ class Instants:
         for part, argument, levels in self._arguments():
             if argument.has(TIME) and argument.free_symbols <= self._still:
                 self._sort(part, argument, levels)
+        for one in graph.parts:
+            if (sampler := one.component.sampler()) is not None:
+                name = f"{one.name}.sample_time"
+                period = Symbol(name, real=True) if name in graph.parameters else Float(sampler.period)
+                self.whole[1 / period, Integer(0)] = None
 
     def _arguments(self) -> Iterator[tuple[str, Expr, tuple[float, ...]]]:
         for branch in self._graph.branches:
