@@ -176,6 +176,8 @@ FOLLOWED = {
     "a pulse at an angle": 1e4 * sympy.exp(-(((sin(T) - 0.377) / 1e-4) ** 2)),
     "a limited ramp": 50 * Max(0, Min(1, (T - 0.3) / 1e-3)),
     "a smooth root": 3 * sqrt(1 + T**2),
+    "clipped smooth noise": Max(0, 1 + 20 * sw.SmoothNoise(T / 0.05, 3)),
+    "a switch at a level of smooth noise": Piecewise((40.0, sw.SmoothNoise(T / 0.05, 2) > 0.7), (0.0, True)),
 }
 
 

@@ -11,6 +11,7 @@ from shaftwork.components.discontinuities import line, narrow_places, switches, 
 from shaftwork.components.law_slopes import MOST_DEGREE
 from shaftwork.components.laws import replaced
 from shaftwork.components.laws import t as TIME
+from shaftwork.components.noise import SmoothNoise
 from shaftwork.core.errors import CompileError
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.kinds import Kind
@@ -36,6 +37,8 @@ class Instants:
         """Lines in time, and the levels at which something switches."""
         self.whole: dict[Straight, None] = {}
         """Lines in time that switch at every whole number."""
+        self.noisy: dict[Expr, None] = {}
+        """What changes its sign at times that smooth noise tells, within one of its pieces."""
         for part, argument, levels in self._arguments():
             if argument.has(TIME) and argument.free_symbols <= self._still:
                 self._sort(part, argument, levels)
@@ -89,6 +92,8 @@ class Instants:
                     self.levels[straight, (0.0,)] = None
                 elif (passes := _passes(factor)) is not None:
                     self.whole.update(dict.fromkeys(passes))
+                elif factor.has(SmoothNoise):
+                    self.noisy[factor] = None
                 else:
                     raise _unsolved(part, f"it switches as {factor} passes zero")
 
@@ -102,6 +107,10 @@ class Instants:
             )
         for slope, offset in self.whole:
             lines += self._block(statements, slope, offset, "next_whole(slope, offset, t)")
+        for number, argument in enumerate(self.noisy):  # a piece of noise ends at the instants before
+            value = [*statements.assigned(["const double value"], [argument]), "return value;"]
+            tables.append(function(f"double noisy_{number}(const NAME *m, double t)", value))
+            lines.append(f"next = next_zero(m, noisy_{number}, t, next);")
         lines.append("return next;")
         return "\n".join([*tables, function("double next_time(const NAME *m, double t)", lines)])
 

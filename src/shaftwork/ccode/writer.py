@@ -160,7 +160,10 @@ class CodeWriter:
             for axis, points in (("X", table.xs), ("Y", table.ys))
         ]
         calls = {"points.c": "table", "noise.c": "held_noise("}
-        calls |= {f"{name}.c": f"{name}(" for name in ("table", "table_slope", "next_level", "next_whole", "is_due")}
+        calls |= {
+            f"{name}.c": f"{name}("
+            for name in ("table", "table_slope", "next_level", "next_whole", "next_zero", "is_due")
+        }
         helpers = ["numbers.c"] * (modes is not None or "solve(" in text)
         helpers += [file for file, call in calls.items() if call in text]
         events = ("events.c", "impacts.c", "iteration.c") if modes else ("smooth.c",)
