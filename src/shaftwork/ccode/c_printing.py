@@ -14,7 +14,7 @@ from shaftwork.codegen.looped_source import CPrinter
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.components.tables import Interpolation, InterpolationSlope, Table
 from shaftwork.core.errors import CompileError
-from shaftwork.formulation.linear_systems import LinearSystem, systems_in
+from shaftwork.formulation.coupled_blocks import CoupledBlock, blocks_in
 
 LARGEST_PRODUCT = 4
 """Powers up to this one of a plain name are products: `pow` takes ten times as long."""
@@ -90,7 +90,7 @@ class Statements:
             CompileError: C has no such function.
         """
         names = dict(self._names)
-        for number, system in enumerate(systems_in(expressions)):
+        for number, system in enumerate(blocks_in(expressions)):
             n, vector = len(system.right), f"solved_{number}"
             yield f"double {vector}[{n}];"
             yield "{"
@@ -103,7 +103,7 @@ class Statements:
             names |= {unknown: f"{vector}[{k}]" for k, unknown in enumerate(system.unknowns)}
         yield from self._assigned(names, dict(zip(targets, expressions, strict=True)))
 
-    def _matrix(self, system: LinearSystem) -> str:
+    def _matrix(self, system: CoupledBlock) -> str:
         """The name of the function that fills in the matrix of a system; its derivatives have the same one."""
         if id(system.matrix) not in self.matrices:
             name, n = f"matrix_{len(self.matrices)}", len(system.right)

@@ -1,8 +1,8 @@
 """The state equations row by row as sympy expressions: for small networks, for reading and for scalar code.
 
-The same equations as in `form`, solved symbolically in blocks of coupled unknowns. A larger block is one node of
-expressions where exported code solves it in numbers, and left to the sparse matrices of the array program otherwise;
-all are tested to agree.
+The same equations as in `form`, solved symbolically in blocks of coupled unknowns. The unknowns of a larger one
+are symbols where exported code solves for them by numbers; otherwise it is left to the sparse matrices of the array
+program. All are tested to agree.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from shaftwork.components.branches import ACROSS, INTEGRAL, RATE
 from shaftwork.components.law_slopes import slope
 from shaftwork.components.laws import replaced
 from shaftwork.components.laws import t as TIME
+from shaftwork.formulation.coupled_blocks import CoupledBlock
 from shaftwork.formulation.form import StateForm
 from shaftwork.formulation.gains import exact_of
-from shaftwork.formulation.linear_systems import LinearSystem
 from shaftwork.formulation.tree import Row
 from shaftwork.network.graph import GROUND, Reading, readings_of
 from shaftwork.network.kinds import Kind
@@ -66,7 +66,7 @@ def explicit_rows(form: StateForm, *, in_numbers: bool = False) -> Rows:
 
     Args:
         form: the state form.
-        in_numbers: whether unknowns of large blocks may stand in the rows, as symbols that have a `LinearSystem`.
+        in_numbers: whether unknowns of large blocks may stand in the rows, as symbols that have a `CoupledBlock`.
 
     Raises:
         BlockTooLargeError: more than `LARGEST_BLOCK` unknowns are coupled, or they are coupled by nonlinear laws.
@@ -80,7 +80,7 @@ class _Solution:
     def __init__(self, form: StateForm, *, in_numbers: bool) -> None:
         self.form, self.graph = form, form.graph
         self.large = self._in_numbers if in_numbers else refused
-        self.systems: list[LinearSystem] = []
+        self.systems: list[CoupledBlock] = []
         self.states = tuple(Symbol(state.name, real=True) for state in form.states)
         carried = zip(form.states, self.states, strict=True)
         symbols = {(state.kind, state.branch): symbol for state, symbol in carried}
@@ -162,7 +162,7 @@ class _Solution:
         """The unknowns of one block as they are, for code that solves for them."""
         place = {unknown: k for k, unknown in enumerate(block)}
         entries = {(place[row], place[column]): entry for (row, column), entry in matrix.items() if row in place}
-        self.systems.append(LinearSystem(entries, [right[unknown] for unknown in block]))
+        self.systems.append(CoupledBlock(entries, [right[unknown] for unknown in block]))
         return self.systems[-1].unknowns
 
     def _solve_conductances(self, sources: Sequence[int]) -> None:

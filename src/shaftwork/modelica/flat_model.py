@@ -12,9 +12,9 @@ from shaftwork.components.laws import omega, phi, s, v
 from shaftwork.components.sources import ForceSource, TorqueSource
 from shaftwork.core.domains import ROTATION
 from shaftwork.core.errors import CompileError
+from shaftwork.formulation.coupled_blocks import CoupledBlock, blocks_in
 from shaftwork.formulation.explicit_rows import BlockTooLargeError, Rows, explicit_rows
 from shaftwork.formulation.form import Names, StateForm
-from shaftwork.formulation.linear_systems import LinearSystem, systems_in
 from shaftwork.formulation.observables import Observables
 from shaftwork.modelica.component_writer import experiment
 from shaftwork.modelica.modelica_expressions import (
@@ -112,7 +112,7 @@ class _Flat:
         units = Names(self._form).units
         for name in shown:
             yield f'  output Real {names[name]}(unit = "{unit(units[name])}") {quoted(name)};'
-        systems = systems_in((*self._rows.rates, *shown.values()))
+        systems = blocks_in((*self._rows.rates, *shown.values()))
         for system in systems:
             array = self._names.unused("solved")
             self._printer.names |= {unknown: f"{array}[{k}]" for k, unknown in enumerate(system.unknowns, 1)}
@@ -126,7 +126,7 @@ class _Flat:
             yield f"  {names[name]} = {self._printer.doprint(expression)};"
         yield f"  {experiment(t_end)}"
 
-    def _coupled(self, system: LinearSystem) -> Iterator[str]:
+    def _coupled(self, system: CoupledBlock) -> Iterator[str]:
         for k, side in enumerate(system.right):
             row = (entry * system.unknowns[j] for (i, j), entry in system.matrix.items() if i == k)
             yield f"  {' + '.join(map(self._printer.doprint, row))} = {self._printer.doprint(side)};"

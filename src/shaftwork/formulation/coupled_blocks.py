@@ -17,7 +17,7 @@ from shaftwork.components.law_slopes import slope
 
 
 @dataclass(frozen=True, eq=False)
-class LinearSystem:
+class CoupledBlock:
     """Equations A x = b.
 
     Args:
@@ -27,7 +27,7 @@ class LinearSystem:
 
     matrix: Mapping[tuple[int, int], Expr]
     right: list[Expr]
-    _derivatives: dict[Symbol, LinearSystem] = field(default_factory=dict)
+    _derivatives: dict[Symbol, CoupledBlock] = field(default_factory=dict)
 
     @cached_property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -39,29 +39,30 @@ class LinearSystem:
         """The symbols on which x depends."""
         return set[Basic]().union(*(entry.free_symbols for entry in (*self.matrix.values(), *self.right)))
 
-    def derivative(self, symbol: Symbol) -> LinearSystem:
+    def derivative(self, symbol: Symbol) -> CoupledBlock:
         """The equations A x' = b' - A' x of the derivative of x by a symbol."""
         if symbol not in self._derivatives:
             slopes = [slope(side, symbol) for side in self.right]
             moving = ((place, entry) for place, entry in self.matrix.items() if symbol in entry.free_symbols)
             for (row, column), entry in moving:
                 slopes[row] -= slope(entry, symbol) * self.unknowns[column]
-            self._derivatives[symbol] = LinearSystem(self.matrix, slopes)
+            self._derivatives[symbol] = CoupledBlock(self.matrix, slopes)
         return self._derivatives[symbol]
 
 
 class Unknown(Dummy):  # type: ignore[misc]
     """An entry of the solution of a system: a symbol that has slopes by those on which the system depends."""
 
-    system: LinearSystem
+    system: CoupledBlock
 
-    def __new__(cls, system: LinearSystem) -> Self:
+    def __new__(cls, system: CoupledBlock) -> Self:
         unknown: Self = super().__new__(cls, "solved", real=True)  # one name: sympy sorts by it first
         unknown.system = system
         return unknown
 
     @property
     def free_symbols(self) -> set[Basic]:
+        """Those on which the system depends."""
         return self.system.free_symbols
 
     def _eval_derivative(self, symbol: Symbol) -> Expr:
@@ -71,11 +72,11 @@ class Unknown(Dummy):  # type: ignore[misc]
         return super(AtomicExpr, self)._eval_derivative_n_times(symbol, n)  # one after the other, as of any function
 
 
-def systems_in(expressions: Iterable[Expr]) -> tuple[LinearSystem, ...]:
+def blocks_in(expressions: Iterable[Expr]) -> tuple[CoupledBlock, ...]:
     """The systems whose unknowns stand in expressions, each after those whose unknowns stand in it."""
-    systems: dict[LinearSystem, None] = {}
+    systems: dict[CoupledBlock, None] = {}
     for node in parts(expressions):
         if isinstance(node, Unknown) and node.system not in systems:
             inner = (*node.system.matrix.values(), *node.system.right)
-            systems |= dict.fromkeys((*systems_in(inner), node.system))
+            systems |= dict.fromkeys((*blocks_in(inner), node.system))
     return tuple(systems)
