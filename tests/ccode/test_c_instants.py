@@ -115,6 +115,48 @@ def test_an_impact_loses_no_digits(tmp_path: Path) -> None:
     assert [outputs["J1.omega"], outputs["J2.omega"]] == pytest.approx([0.5, 3.0], rel=1e-14)
 
 
+def sampled(*parts: sw.Component) -> sw.Network:
+    """A speed control with an integrator, whose reference jumps at one of its instants, and parts at the load."""
+    net = sw.Network("sampled")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.Spring("shaft", c=50.0, d=0.2), "a", "b")
+    net.add(sw.Inertia("J2", J=2.0), "b")
+    gains = {"A": [[1.0]], "B": [[0.02]], "C": [[1.0]], "D": [[3.0]]}
+    reference = sw.Step(4.0, 0.1)
+    net.add(sw.StateSpaceController("pi", **gains, measured=["J2.omega"], reference=reference, sample_time=0.02), "a")
+    for part in parts:
+        net.add(part, "b")
+    return net
+
+
+OTHER = sw.TransferFunctionController(
+    "other", numerator=[2.0, -1.0], denominator=[1.0, -0.5], measured="shaft.tau_c", sample_time=0.033, setpoints=[0.3]
+)
+SAMPLED = {
+    "alone": (),
+    "two rates beside a brake": (OTHER, sw.Brake("brake", tau=5.0, t_on=0.4, t_off=0.6)),
+    "stick and slip": (sw.DryFriction("rubs", tau_c=3.0, tau_s=4.0),),
+    "a source that jumps": (OTHER, sw.TorqueSource("pull", tau=sw.Step(3.0, 0.1) - sw.Step(5.0, 0.33))),
+}
+
+
+@pytest.mark.parametrize("parts", SAMPLED.values(), ids=SAMPLED)
+def test_sampled_controllers_act_at_their_instants(parts: tuple[sw.Component, ...], tmp_path: Path) -> None:
+    library = assert_moves_as_in_the_library(sampled(*parts), 1.0, tmp_path)
+    assert library.struct.events >= 49
+
+
+def test_reference_and_period_of_a_sampled_controller_are_set_by_the_program(tmp_path: Path) -> None:
+    library = Library(c_code(sampled().compile(), inputs=["pi.reference"]), tmp_path)
+    library.struct.u[0] = 4.0
+    library.struct.p[[each.name for each in library.code.parameters].index("pi.sample_time")] = 0.05
+    library.call("start", 0.0)
+    library.call("integrate", 0.99, RTOL)
+    net = sampled()
+    model = net.compile().with_values({"pi.reference": 4.0, "pi.sample_time": 0.05})
+    assert library.outputs()["J2.omega"] == pytest.approx(model.simulate(0.99, rtol=RTOL)["J2.omega"][-1], rel=MOTION)
+
+
 def two_masses(tau: object) -> sw.Network:
     net = sw.Network("two masses")
     net.add(sw.TorqueSource("motor", tau=tau), "a")
@@ -134,6 +176,8 @@ FOLLOWED = {
     "a pulse at an angle": 1e4 * sympy.exp(-(((sin(T) - 0.377) / 1e-4) ** 2)),
     "a limited ramp": 50 * Max(0, Min(1, (T - 0.3) / 1e-3)),
     "a smooth root": 3 * sqrt(1 + T**2),
+    "clipped smooth noise": Max(0, 1 + 20 * sw.SmoothNoise(T / 0.05, 3)),
+    "a switch at a level of smooth noise": Piecewise((40.0, sw.SmoothNoise(T / 0.05, 2) > 0.7), (0.0, True)),
 }
 
 

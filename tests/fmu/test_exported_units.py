@@ -200,6 +200,21 @@ def test_a_network_without_states_has_outputs_that_jump(kind: str, tmp_path: Pat
     np.testing.assert_allclose(seen["load.tau"], [0.5, 0.5, 0.5, 1.5, 1.5, 1.5], rtol=1e-12)
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_sampled_controller_acts_at_its_instants(kind: str, tmp_path: Path) -> None:
+    net = sw.Network("sampled")
+    net.add(sw.Inertia("J", J=2.0), "a")
+    net.add(sw.DryFriction("rubs", tau_c=1.0), "a")
+    gains = {"A": [[1.0]], "B": [[0.1]], "C": [[1.0]], "D": [[3.0]]}
+    net.add(sw.StateSpaceController("pi", **gains, measured=["J.omega"], reference=4.0, sample_time=0.1), "a")
+    model = net.compile()
+    model.to_fmu(tmp_path / "unit.fmu", outputs=["J.omega"])
+    options = {"stop_time": 1.55, "output_interval": 0.05, "relative_tolerance": 1e-10, "record_events": False}
+    seen = fmpy.simulate_fmu(str(tmp_path / "unit.fmu"), fmi_type=kind, **options)
+    motion = model.simulate(1.55, rtol=1e-11, t_eval=seen["time"].clip(0, 1.55))
+    np.testing.assert_allclose(seen["J.omega"], motion["J.omega"], atol=1e-6)
+
+
 @pytest.mark.parametrize("version", VERSIONS)
 def test_a_restored_state_goes_on_to_the_same_bits(unit: Units, version: str) -> None:
     names = ("J1.omega", "J2.omega", "shaft.tau")

@@ -224,6 +224,25 @@ def test_a_motion_that_comes_to_rest_on_a_switch_goes_on(rest: str, engine: str)
     assert sol.statistics["steps"] < 2000  # some hundred for the decay, and long steps for the rest of 200 s
 
 
+@pytest.mark.parametrize("engine", ENGINES[:3])
+def test_a_law_bends_after_the_last_part_has_changed_its_mode(engine: str) -> None:
+    """A switch that closes for good leaves no guard; the fan still turns round."""
+    net = sw.Network("for good")
+    net.add(sw.TorqueSource("motor", tau=5 * sympy.sin(7 * sw.t)), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.FanLoad("fan", tau_n=5.0, n_n=10.0), "a")
+    net.add(sw.VoltageSource("source", u=2.0), "p", "ground")
+    net.add(sw.Switch("switch", t_on=0.2), "p", "q")
+    net.add(sw.Resistor("R", R=5.0), "q", "c")
+    net.add(sw.Capacitor("C", C=0.1), "c", "ground")
+    omega = solve_ivp(
+        lambda t, x: 5 * np.sin(7 * t) - 5.0 * x * abs(x) / (10 * np.pi / 30) ** 2, (0, 2), [0.0], "DOP853",
+        rtol=1e-12, atol=1e-14, max_step=1e-2,
+    ).y[0, -1]  # fmt: skip
+    sol = net.compile().simulate(2.0, engine=engine, rtol=1e-9)
+    assert sol["J.omega"][-1] == pytest.approx(omega, abs=1e-7)
+
+
 def test_a_network_without_such_laws_is_not_looked_at() -> None:
     problem = falling(None)
     untouched = Crossings(problem, pieces(problem)[0])

@@ -14,6 +14,7 @@ from shaftwork.codegen.looped_source import CPrinter
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.components.tables import Interpolation, InterpolationSlope, Table
 from shaftwork.core.errors import CompileError
+from shaftwork.formulation.coupled_blocks import CoupledBlock, blocks_in
 
 LARGEST_PRODUCT = 4
 """Powers up to this one of a plain name are products: `pow` takes ten times as long."""
@@ -79,6 +80,8 @@ class Statements:
     def __init__(self, names: Mapping[Symbol, str], title: str) -> None:
         self._names, self._title = names, title
         self.tables: dict[Table, int] = {}
+        self.matrices: dict[int, tuple[str, str]] = {}
+        """Name and text of the function of each matrix, by its identity."""
 
     def assigned(self, targets: Sequence[str], expressions: Sequence[Expr]) -> Iterator[str]:
         """The lines that assign expressions to targets.
@@ -86,12 +89,36 @@ class Statements:
         Raises:
             CompileError: C has no such function.
         """
-        plain = [_in_pieces(expression) for expression in expressions]
-        printer = TablePrinter(self._names, self.tables)
+        names = dict(self._names)
+        for number, system in enumerate(blocks_in(expressions)):
+            n, vector = len(system.right), f"solved_{number}"
+            yield f"double {vector}[{n}];"
+            yield "{"
+            yield f"    double matrix[{n * n}] = {{0.0}};"
+            yield f"    {self._matrix(system)}(m, t, x, matrix);"
+            sides = {f"{vector}[{k}]": side for k, side in enumerate(system.right)}
+            yield from (f"    {line}" for line in self._assigned(names, sides))
+            yield f"    solve({n}, matrix, 1, {vector});"
+            yield "}"
+            names |= {unknown: f"{vector}[{k}]" for k, unknown in enumerate(system.unknowns)}
+        yield from self._assigned(names, dict(zip(targets, expressions, strict=True)))
+
+    def _matrix(self, system: CoupledBlock) -> str:
+        """The name of the function that fills in the matrix of a system; its derivatives have the same one."""
+        if id(system.matrix) not in self.matrices:
+            name, n = f"matrix_{len(self.matrices)}", len(system.right)
+            lines = self.assigned([f"matrix[{i * n + j}]" for i, j in system.matrix], [*system.matrix.values()])
+            head = f"void {name}(const NAME *m, double t, const double *restrict x, double *restrict matrix)"
+            self.matrices[id(system.matrix)] = name, function(head, [*lines])
+        return self.matrices[id(system.matrix)][0]
+
+    def _assigned(self, names: Mapping[Symbol, str], values: Mapping[str, Expr]) -> Iterator[str]:
+        plain = [_in_pieces(expression) for expression in values.values()]
+        printer = TablePrinter(names, self.tables)
         try:
             for name, code in shared_parts(printer, plain).items():
                 yield f"const double {name} = {code};"
-            for target, expression in zip(targets, plain, strict=True):
+            for target, expression in zip(values, plain, strict=True):
                 yield f"{target} = {printer.doprint(expression)};"
         except PrintMethodNotImplementedError as error:
             raise CompileError(
@@ -108,7 +135,7 @@ def _in_pieces(expression: Expr) -> Expr:
 def function(head: str, lines: Sequence[str]) -> str:
     """A static C function; arguments that its lines do not read are marked as unused."""
     names = [argument.split("*")[-1].split(" ")[-1] for argument in head[head.index("(") + 1 : -1].split(", ")]
-    words = {word for line in lines for word in re.findall(r"\w+", line)}
+    words = {word for line in lines for word in re.findall(r"(?<!->)\b\w+", line)}
     unused = [f"(void){name};" for name in names if name not in words]
     return "\n".join([f"static {head}", "{", *(f"    {line}" for line in (*unused, *lines)), "}", ""])
 

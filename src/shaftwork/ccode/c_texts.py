@@ -15,6 +15,7 @@ ARGUMENTS = {
     "outputs": ("x", "y"),
     "stores": ("x", "stored"),
     "take_up": ("stored", "x"),
+    "samples": ("x", "after"),
     "guards": ("x", "g"),
     "across": ("x", "speeds"),
     "begins": ("x", "holds"),

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from sympy import Abs, Expr, Max, Min, Mul, Piecewise, Pow, Symbol, asin, cos, floor, pi, simplify, sin
+from sympy import Abs, Expr, Float, Integer, Max, Min, Mul, Piecewise, Pow, Symbol, asin, cos, floor, pi, simplify, sin
 
 from shaftwork.ccode.c_printing import Statements, array, function
 from shaftwork.components.discontinuities import line, narrow_places, switches, unsolved_places
 from shaftwork.components.law_slopes import MOST_DEGREE
 from shaftwork.components.laws import replaced
 from shaftwork.components.laws import t as TIME
+from shaftwork.components.noise import SmoothNoise
 from shaftwork.core.errors import CompileError
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.kinds import Kind
@@ -36,9 +37,16 @@ class Instants:
         """Lines in time, and the levels at which something switches."""
         self.whole: dict[Straight, None] = {}
         """Lines in time that switch at every whole number."""
+        self.noisy: dict[Expr, None] = {}
+        """What changes its sign at times that smooth noise tells, within one of its pieces."""
         for part, argument, levels in self._arguments():
             if argument.has(TIME) and argument.free_symbols <= self._still:
                 self._sort(part, argument, levels)
+        for one in graph.parts:
+            if (sampler := one.component.sampler()) is not None:
+                name = f"{one.name}.sample_time"
+                period = Symbol(name, real=True) if name in graph.parameters else Float(sampler.period)
+                self.whole[1 / period, Integer(0)] = None
 
     def _arguments(self) -> Iterator[tuple[str, Expr, tuple[float, ...]]]:
         for branch in self._graph.branches:
@@ -84,6 +92,8 @@ class Instants:
                     self.levels[straight, (0.0,)] = None
                 elif (passes := _passes(factor)) is not None:
                     self.whole.update(dict.fromkeys(passes))
+                elif factor.has(SmoothNoise):
+                    self.noisy[factor] = None
                 else:
                     raise _unsolved(part, f"it switches as {factor} passes zero")
 
@@ -97,6 +107,10 @@ class Instants:
             )
         for slope, offset in self.whole:
             lines += self._block(statements, slope, offset, "next_whole(slope, offset, t)")
+        for number, argument in enumerate(self.noisy):  # a piece of noise ends at the instants before
+            value = [*statements.assigned(["const double value"], [argument]), "return value;"]
+            tables.append(function(f"double noisy_{number}(const NAME *m, double t)", value))
+            lines.append(f"next = next_zero(m, noisy_{number}, t, next);")
         lines.append("return next;")
         return "\n".join([*tables, function("double next_time(const NAME *m, double t)", lines)])
 

@@ -6,17 +6,23 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from sympy import Add, Expr, Integer, Symbol
+import numpy as np
+from sympy import Add, Expr, Float, Integer, Symbol
 
 from shaftwork.ccode.c_printing import Statements, function
 from shaftwork.ccode.c_texts import ARGUMENTS, dispatcher, signature
 from shaftwork.ccode.equation_set import EquationSet
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.law_slopes import slope
+from shaftwork.components.laws import as_expression
+from shaftwork.components.laws import t as TIME
 from shaftwork.formulation.form import store_name
 from shaftwork.formulation.gains import exact_of
 from shaftwork.formulation.tree import Row
 from shaftwork.network.kinds import Kind
+
+LATER = Symbol("later", real=True)
+"""The time behind an instant, at which what is asked of sampled controllers has jumped."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +82,7 @@ class SetFunctions:
         """The functions that no other set shares."""
         masses = self._masses() if self._ties and not self.layout.has_modes else None
         inertias = [self._function("masses", self.assigned([*masses], [*masses.values()]))] if masses else []
-        return "\n".join([*inertias, self._take_up()])
+        return "\n".join([*inertias, self._take_up(), self._samples()])
 
     def _function(self, name: str, lines: Iterable[str]) -> str:
         """A function of this set: its name ends with the number of the set."""
@@ -136,6 +142,34 @@ class SetFunctions:
         free = [(place, state) for place, state in zip(self.places, form.states, strict=True) if not tied[state.kind]]
         lines += self.assigned([f"x[{place}]" for place, _ in free], [stored_symbol(state.name) for _, state in free])
         return self._function("take_up", lines)
+
+    def _samples(self) -> str:
+        """What sampled controllers hold after an instant: see `components.sampling`."""
+        graph, lines = self.form.graph, list[str]()
+        for part in graph.parts:
+            if (sampler := part.component.sampler()) is None:
+                continue
+            names = {key: f"{part.name}.{key}" for key in ("reference", "sample_time")}
+            values = {"reference": as_expression(sampler.reference), "sample_time": Float(sampler.period)}
+            reference, period = (
+                Symbol(name, real=True) if name in graph.parameters else values[key] for key, name in names.items()
+            )
+            e = [point - self._measured(name) for point, name in zip(sampler.setpoints, sampler.measured, strict=True)]
+            e[0] += reference.xreplace({TIME: LATER})
+            x = [Symbol(f"{part.name}.x_{k + 1}", real=True) for k in range(len(sampler.A))]
+            steps = {f"{part.name}.x_u_{k + 1}": row for k, row in enumerate(np.hstack((sampler.C, sampler.D)))}
+            steps |= {symbol.name: row for symbol, row in zip(x, np.hstack((sampler.A, sampler.B)), strict=True)}
+            targets = ["const double period", *(f"after[{self.layout.states.index(name)}]" for name in steps)]
+            sums = [
+                Add(*(float(gain) * one for gain, one in zip(row, [*x, *e], strict=True))) for row in steps.values()
+            ]
+            lines += ["{", *self.assigned(targets[:1], [period]), "if (is_due(m->t, period)) {"]
+            lines += [*self.assigned(targets[1:], sums), "}", "}"]
+        return self._function("samples", lines)
+
+    def _measured(self, name: str) -> Expr:
+        quantity = self.observables.quantity(name)
+        return self.observables.store(name) if quantity is None else quantity
 
     def _speeds_taken_up(self) -> Iterator[str]:
         """(C + Q K F') x = C v + Q K (v_K - F_E' e)."""

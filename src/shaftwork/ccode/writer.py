@@ -13,7 +13,7 @@ from shaftwork.ccode.c_printing import Statements, array
 from shaftwork.ccode.c_texts import dispatcher, filled, names_of, runtime
 from shaftwork.ccode.equation_set import EquationSet
 from shaftwork.ccode.instants import Instants
-from shaftwork.ccode.set_functions import ArrayLayout, SetFunctions, functions_of_sets, stored_symbol
+from shaftwork.ccode.set_functions import LATER, ArrayLayout, SetFunctions, functions_of_sets, stored_symbol
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import SignalError
@@ -121,7 +121,7 @@ class CodeWriter:
     @cached_property
     def _names(self) -> dict[Symbol, str]:
         """The code of every symbol."""
-        names = {TIME: "t"}
+        names = {TIME: "t", LATER: "(m->t + 2.0 * clearance(m->t))"}
         for letter, variables in (("m->p", self.parameters), ("m->u", self.inputs), ("x", self.states)):
             names |= {Symbol(v.name, real=True): f"{letter}[{k}]" for k, v in enumerate(variables)}
         names |= {stored_symbol(name): f"stored[{k}]" for k, name in enumerate(self.stores)}
@@ -150,17 +150,20 @@ class CodeWriter:
         for name in functions[0].assignments:
             body += functions_of_sets(name, [one.assignments[name] for one in functions], statements)
         body += [one.text for one in functions]
-        body.append(dispatcher("take_up", len(functions)))
+        body += [dispatcher(name, len(functions)) for name in ("take_up", "samples")]
         body += modes.texts(functions, statements) if modes else [runtime("no_modes.c")]
         body.append(Instants(self._model.form.graph, still).text(statements))
-        text = "\n".join(body)
+        text = "\n".join([*(text for _, text in statements.matrices.values()), *body])
         tables = [
             array("const double", f"TABLE_{k}_{axis}", [*map(repr, points)])
             for table, k in statements.tables.items()
             for axis, points in (("X", table.xs), ("Y", table.ys))
         ]
         calls = {"points.c": "table", "noise.c": "held_noise("}
-        calls |= {f"{name}.c": f"{name}(" for name in ("table", "table_slope", "next_level", "next_whole")}
+        calls |= {
+            f"{name}.c": f"{name}("
+            for name in ("table", "table_slope", "next_level", "next_whole", "next_zero", "is_due")
+        }
         helpers = ["numbers.c"] * (modes is not None or "solve(" in text)
         helpers += [file for file, call in calls.items() if call in text]
         events = ("events.c", "impacts.c", "iteration.c") if modes else ("smooth.c",)

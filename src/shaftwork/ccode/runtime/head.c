@@ -13,3 +13,9 @@ enum {
     NG = NAME_GUARDS > 0 ? NAME_GUARDS : 1,
     NGUARDS = NAME_GUARDS
 };
+
+/* How far beside an instant rounding may put it. */
+static double clearance(double t)
+{
+    return 64.0 * DBL_EPSILON * fmax(fabs(t), 1e-6);
+}

@@ -226,6 +226,7 @@ int NAME_event(NAME *m)
     memcpy(x, m->x, sizeof x);
     m->events++;
     if (m->t + clearance(m->t) >= m->next) {
+        (void)sample(m);
         NAME jumps = *m;
         const int changed = jump(&jumps);
         int holds = 0;
@@ -282,7 +283,8 @@ int NAME_start(NAME *m, double t)
             }
         (void)to_modes(m, mode);
     }
-    const int transitions = consistent(m, -1);
+    int transitions = consistent(m, -1);
+    if (transitions >= 0 && sample(m)) transitions = consistent(m, -1);
     return transitions < 0 ? transitions : 0;
 }
 

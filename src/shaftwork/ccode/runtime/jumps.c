@@ -1,3 +1,17 @@
+/* What sampled controllers hold from an instant on; whether that changes a state. */
+static int sample(NAME *m)
+{
+    double x[NX];
+    int changed = 0;
+    for (int i = 0; i < NX; i++) x[i] = m->x[i];
+    samples(m, inside(m, m->t), m->x, x);
+    for (int i = 0; i < NX; i++) {
+        if (x[i] != m->x[i]) changed = NAME_STATES_CHANGED;
+        m->x[i] = x[i];
+    }
+    return changed;
+}
+
 /* What is stored goes on beyond an instant at which sources jump. */
 static int jump(NAME *m)
 {

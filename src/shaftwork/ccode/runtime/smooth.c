@@ -4,7 +4,8 @@ int NAME_event(NAME *m)
     m->met = -1;
     if (m->t + clearance(m->t) < m->next) return 0;
     m->events++;
-    return jump(m);
+    const int sampled = sample(m);
+    return sampled | jump(m);
 }
 
 int NAME_start(NAME *m, double t)
@@ -15,6 +16,7 @@ int NAME_start(NAME *m, double t)
     m->met = -1;
     pass(m, t);
     take_up(m, inside(m, t), m->start, m->x);
+    (void)sample(m);
     return 0;
 }
 

@@ -21,12 +21,6 @@ void NAME_outputs(const NAME *m, double t, const double *x, double *y)
     outputs(m, inside(m, t), x, y);
 }
 
-/* How far beside an instant rounding may put it. */
-static double clearance(double t)
-{
-    return 64.0 * DBL_EPSILON * fmax(fabs(t), 1e-6);
-}
-
 double NAME_next_time(const NAME *m, double t)
 {
     return next_time(m, t + clearance(t));

@@ -126,7 +126,7 @@ class TaylorRun:
         if outcome == GUARD:
             met: int | None = self.program.guard_met(raw)
             return met
-        if watch is None or self.problem.guards is None or watch.reason is not None:
+        if watch is None or self.problem.guards is None or not self.program.guards or watch.reason is not None:
             return None
         time, state = self.integrator.time, self.integrator.state
         beyond = self._beyond(time, state)
