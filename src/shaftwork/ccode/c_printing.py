@@ -17,6 +17,8 @@ from shaftwork.core.errors import CompileError
 
 LARGEST_PRODUCT = 4
 """Powers up to this one of a plain name are products: `pow` takes ten times as long."""
+TERM = re.compile(r"\bs\d+\b")
+"""The name of what stands in expressions more than once."""
 
 
 class TablePrinter(CPrinter):
@@ -69,7 +71,7 @@ class TablePrinter(CPrinter):
 
 
 class Statements:
-    """Writes expressions as assignments, what stands in them more than once first.
+    """Writes expressions as assignments.
 
     Args:
         names: C code of every symbol.
@@ -81,7 +83,13 @@ class Statements:
         self.tables: dict[Table, int] = {}
 
     def assigned(self, targets: Sequence[str], expressions: Sequence[Expr]) -> Iterator[str]:
-        """The lines that assign expressions to targets.
+        """The lines that assign expressions to targets, what stands in them more than once first."""
+        terms, codes = self.in_terms(expressions)
+        yield from (f"const double {term} = {code};" for term, code in terms.items())
+        yield from (f"{target} = {code};" for target, code in zip(targets, codes, strict=True))
+
+    def in_terms(self, expressions: Sequence[Expr]) -> tuple[dict[str, str], list[str]]:
+        """The code of what stands in expressions more than once, by its name, and that of the expressions.
 
         Raises:
             CompileError: C has no such function.
@@ -89,10 +97,7 @@ class Statements:
         plain = [_in_pieces(expression) for expression in expressions]
         printer = TablePrinter(self._names, self.tables)
         try:
-            for name, code in shared_parts(printer, plain).items():
-                yield f"const double {name} = {code};"
-            for target, expression in zip(targets, plain, strict=True):
-                yield f"{target} = {printer.doprint(expression)};"
+            return shared_parts(printer, plain, scaled=False), [printer.doprint(expression) for expression in plain]
         except PrintMethodNotImplementedError as error:
             raise CompileError(
                 f"'{self._title}' has a law that C has no function for: {error}. Write it with others, or as a Table."

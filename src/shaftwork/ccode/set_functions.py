@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 from sympy import Add, Expr, Integer, Symbol
 
-from shaftwork.ccode.c_printing import Statements, function
-from shaftwork.ccode.c_texts import ARGUMENTS, dispatcher, signature
+from shaftwork.ccode.c_printing import TERM, Statements, array, function
+from shaftwork.ccode.c_texts import signature
 from shaftwork.ccode.equation_set import EquationSet
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.law_slopes import slope
@@ -27,34 +27,31 @@ class ArrayLayout:
         states: names of the states of all sets of equations.
         stores: names of everything that is stored.
         outputs: names of the outputs.
-        has_modes: whether there are impacts, which need the inertias of the states.
         statements: writes expressions.
     """
 
     states: tuple[str, ...]
     stores: tuple[str, ...]
     outputs: tuple[str, ...]
-    has_modes: bool
     statements: Statements
 
 
 class SetFunctions:
-    """The functions of one set of equations.
+    """What the functions compute in one set of equations.
 
     Args:
-        number: of the set.
         equations: the set.
         layout: of all sets.
     """
 
-    def __init__(self, number: int, equations: EquationSet, layout: ArrayLayout) -> None:
-        self.number, self.layout = number, layout
+    def __init__(self, equations: EquationSet, layout: ArrayLayout) -> None:
+        self.layout = layout
         self.form, self.rows, self.observables = equations.form, equations.rows, equations.observables
         self.places = [layout.states.index(state.name) for state in self.form.states]
         """Where its states are among those of all sets."""
 
     @property
-    def _ties(self) -> bool:
+    def ties(self) -> bool:
         """Whether inertias among the states carry others."""
         return bool(self.form.dependent_across and self.form.across_states)
 
@@ -68,19 +65,8 @@ class SetFunctions:
         """By the name of a function what it assigns, target to expression."""
         outputs = {f"y[{k}]": self.observables.quantity(name) for k, name in enumerate(self.layout.outputs)}
         stored = {f"stored[{k}]": self.observables.store(name) for k, name in enumerate(self.layout.stores)}
-        masses = {"masses": self._masses()} if self.layout.has_modes else {}
-        return {"rates": self._rates(), "jacobian": self._jacobian(), "outputs": outputs, "stores": stored} | masses
-
-    @cached_property
-    def text(self) -> str:
-        """The functions that no other set shares."""
-        masses = self._masses() if self._ties and not self.layout.has_modes else None
-        inertias = [self._function("masses", self.assigned([*masses], [*masses.values()]))] if masses else []
-        return "\n".join([*inertias, self._take_up()])
-
-    def _function(self, name: str, lines: Iterable[str]) -> str:
-        """A function of this set: its name ends with the number of the set."""
-        return function(signature(name, f"_{self.number}"), [*lines])
+        moving = {"rates": self._rates(), "jacobian": self._jacobian()}
+        return {**moving, "outputs": outputs, "stores": stored, "masses": self._masses(), "loads": dict(self._loads())}
 
     def assigned(self, targets: Sequence[str], expressions: Sequence[Expr]) -> Iterator[str]:
         """Lines that assign expressions to targets."""
@@ -127,19 +113,24 @@ class SetFunctions:
         row = {tree: gain for tree, gain in rows[link].items() if tree in self.form.across_states}
         return list(zip(row, exact_of(row.values()), strict=True))
 
-    def _take_up(self) -> str:
-        """The states that take up what was stored with the least change: see `codegen.state_transfer`."""
-        form = self.form
-        lines = [*self._speeds_taken_up()] if self._ties else []
+    @cached_property
+    def take_up(self) -> tuple[str, ...]:
+        """Lines that find the states closest to what was stored: see `codegen.state_transfer`."""
+        form, n = self.form, len(self.form.across_states)
+        lines = list[str]()
+        if self.ties:
+            lines += ["double mass[NX * NX] = {0.0}, right[NX];", "masses(m, t, stored, mass);"]
+            lines += ["loads(m, t, stored, right);", f"solve({n}, mass, 1, right);"]
+            lines += (f"x[{place}] = right[{k}];" for k, place in enumerate(self.places[form.speeds]))
         lines += self._torques_taken_up() if self._slack else []
-        tied = {"across": self._ties, "through": self._slack, "integral": ()}
+        tied = {"across": self.ties, "through": self._slack, "integral": ()}
         free = [(place, state) for place, state in zip(self.places, form.states, strict=True) if not tied[state.kind]]
         lines += self.assigned([f"x[{place}]" for place, _ in free], [stored_symbol(state.name) for _, state in free])
-        return self._function("take_up", lines)
+        return tuple(lines)
 
-    def _speeds_taken_up(self) -> Iterator[str]:
-        """(C + Q K F') x = C v + Q K (v_K - F_E' e)."""
-        form, n = self.form, len(self.form.across_states)
+    def _loads(self) -> Iterator[tuple[str, Expr]]:
+        """(C + Q K F') x = C v + Q K (v_K - F_E' e): the right-hand side."""
+        form = self.form
         right = {k: form.law_of(k) * self._stored(k) for k in form.across_states}
         for link in form.dependent_across:
             row = form.tree.loops[link]
@@ -147,11 +138,7 @@ class SetFunctions:
             prescribed = Add(*(gain * self.rows.across[tree] for tree, gain in pairs if tree in form.across_inputs))
             for tree, share in self._row(form.tree.cutsets, link):
                 right[tree] += share * form.law_of(link) * (self._stored(link) - prescribed)
-        yield f"double mass[{n * n}] = {{0.0}}, right[{n}];"
-        yield f"masses_{self.number}(m, t, stored, mass);"
-        yield from self._block([f"right[{k}]" for k in range(n)], [*right.values()])
-        yield f"solve({n}, mass, 1, right);"
-        yield from (f"x[{place}] = right[{k}];" for k, place in enumerate(self.places[form.speeds]))
+        yield from ((f"right[{k}]", momentum) for k, momentum in enumerate(right.values()))
 
     def _torques_taken_up(self) -> Iterator[str]:
         """(1 / L + F' Q / S) x = i / L - F' (i_S + Q_SW w) / S."""
@@ -191,35 +178,63 @@ class SetFunctions:
         return stored_symbol(store_name(self.form.graph, self.form.graph.branches[branch]))
 
 
-def functions_of_sets(name: str, sets: Sequence[Mapping[str, Expr]], statements: Statements) -> Iterator[str]:
-    """A function of each set of equations, and the one that calls that of the set of an instance.
-
-    Rows that half of the sets or more have in common stand in one function that theirs call. Rows of fewer sets stay
-    with the others of their set: what they have in common with those, such as a sine, is then evaluated once.
+def function_of_sets(name: str, sets: Sequence[Mapping[str, Expr]], statements: Statements) -> str:
+    """The function of all sets of equations: each row and each term once, in a block for the sets that need it.
 
     Args:
-        name: of the functions, as in `c_texts.ARGUMENTS`.
+        name: of the function, as in `c_texts.ARGUMENTS`.
         sets: what each of them assigns, target to expression.
         statements: writes expressions.
     """
-    call = ", ".join(("m", "t", *ARGUMENTS[name]))
-    sharers: dict[tuple[str, Expr], list[int]] = {}
+    rows: dict[tuple[str, Expr], int] = {}  # to the sets that need it, as bits of a number
     for number, one in enumerate(sets):
         for row in one.items():
-            sharers.setdefault(row, []).append(number)
-    groups: dict[tuple[int, ...], dict[str, Expr]] = {}
-    for (target, expression), numbers in sharers.items():
-        together = [tuple(numbers)] if 2 * len(numbers) >= len(sets) else [(number,) for number in numbers]
-        for sharing in together:
-            groups.setdefault(sharing, {})[target] = expression
-    lines: dict[str, list[str]] = {f"_{number}": [] for number in range(len(sets))}
-    for k, (sharing, rows) in enumerate(groups.items()):
-        suffix = f"_shared_{k}" if len(sharing) > 1 else f"_{sharing[0]}"
-        for number in sharing if len(sharing) > 1 else ():
-            lines[f"_{number}"].append(f"{name}{suffix}({call});")
-        lines.setdefault(suffix, []).extend(statements.assigned([*rows], [*rows.values()]))
-    yield from (function(signature(name, suffix), text) for suffix, text in reversed(lines.items()))
-    yield dispatcher(name, len(sets))
+            rows[row] = rows.get(row, 0) | 1 << number
+    terms, codes = statements.in_terms([expression for _, expression in rows])
+    lines = [(target, code, need) for ((target, _), need), code in zip(rows.items(), codes, strict=True)]
+    needs = dict.fromkeys(terms, 0)
+    for _, code, need in lines:
+        needs |= {term: needs[term] | need for term in TERM.findall(code)}
+    for reader, code in reversed(terms.items()):
+        needs |= {term: needs[term] | needs[reader] for term in TERM.findall(code)}
+    lines = [*((term, code, needs[term]) for term, code in terms.items()), *lines]
+    always = (1 << len(sets)) - 1
+    reads = ((term, need) for _, code, need in lines for term in TERM.findall(code))
+    crossing = dict.fromkeys(term for term, need in reads if needs[term] not in (need, always))
+    blocks: dict[int, list[str]] = {always: []}
+    for target, code, need in lines:
+        head = "const double " if target in terms and target not in crossing else ""
+        blocks.setdefault(need, []).append(f"{head}{target} = {code};")
+    return _in_blocks(name, [f"double {term} = 0.0;" for term in crossing], blocks, len(sets))
+
+
+def _in_blocks(name: str, first: Sequence[str], blocks: Mapping[int, Sequence[str]], count: int) -> str:
+    """A function of blocks; a term is read in sets that need it alone, so that blocks of more sets come first."""
+    (_, lines), *some = sorted(blocks.items(), key=lambda block: -block[0].bit_count())
+    if not some:
+        return function(signature(name), lines)
+    size, table = 32, f"BLOCKS_OF_{name.upper()}"  # bits of a number
+    words = -(-len(some) // size)
+    members = [sum((need >> number & 1) << k for k, (need, _) in enumerate(some)) for number in range(count)]
+    bits = [f"0x{member >> size * word & (1 << size) - 1:x}u" for member in members for word in range(words)]
+    lines = [f"const uint32_t *const needs = {table} + {words} * m->set;", *first, *lines]
+    for k, (_, block) in enumerate(some):
+        lines += [f"if ((needs[{k // size}] >> {k % size} & 1u) != 0u) {{", *(f"    {line}" for line in block), "}"]
+    comment = f"/* Of each set of equations the blocks of `{name}` that it needs, as bits. */\n"
+    return comment + array("const uint32_t", table, bits) + "\n" + function(signature(name), lines)
+
+
+def take_up_of_sets(sets: Sequence[SetFunctions]) -> str:
+    """The function `take_up` of all sets of equations, of which several say the same."""
+    cases: dict[tuple[str, ...], list[str]] = {}
+    for number, one in enumerate(sets):
+        cases.setdefault(one.take_up, []).append(f"case {number}:")
+    lines = list[str]()
+    for body, labels in cases.items():
+        lines += [" ".join(labels) + " {", *(f"    {line}" for line in body), "    break;", "}"]
+    if len(sets) == 1:
+        return function(signature("take_up"), sets[0].take_up)
+    return function(signature("take_up"), ["switch (m->set) {", *lines, "default: break;", "}"])
 
 
 def stored_symbol(name: str) -> Symbol:
