@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import given
 
 import shaftwork as sw
 from tests.beds import bed_of, registered
+from tests.coupled import COUPLED
 from tests.modelica.rumoca_runs import deviation, stores
 from tests.properties.examples import network_of, share_of_examples
 from tests.strategies import Network as Pieces
@@ -222,6 +224,12 @@ def test_laws_of_angles_and_tables_and_nodes_without_mass_move_alike(build: obje
     text = net.to_modelica(form=form, library="inline")
     pairs = {"J2.omega": "J2_omega" if form == "flat" else "J2.w"}
     assert deviation(net, pairs, 1.0, text=text) < AGREES
+
+
+@pytest.mark.parametrize("build", COUPLED.values(), ids=COUPLED)
+def test_many_that_determine_each_other_are_simultaneous_equations(build: Callable[[int], sw.Network]) -> None:
+    net = build(2)
+    assert deviation(net, stores(net, flat=True), 0.5, text=net.to_modelica(form="flat")) < AGREES
 
 
 @pytest.mark.parametrize(

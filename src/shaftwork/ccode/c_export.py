@@ -171,15 +171,12 @@ def _refuse(model: Model, inputs: Sequence[str]) -> None:
     """Refuse what has no code in C.
 
     Raises:
-        CompileError: waves, algebraic loops, sampled controllers, or an input whose rate would be needed.
+        CompileError: waves, sampled controllers, or an input whose rate would be needed.
     """
     form, title = model.form, model.name
     refuse_sampled(form, "C code of the equations alone would leave out what it does", CompileError)
     if form.waves:
         raise CompileError(f"'{title}' has travelling waves, whose equations need the past. Take model=Spectral(16).")
-    if form.loop_laws:
-        names = listed([form.graph.part_of(k).name for k in form.loop_laws])
-        raise CompileError(f"'{title}' has an algebraic loop through {names}. Give the node of that part an inertia.")
     rigid = {
         form.graph.part_of(k).name
         for link in form.dependent_across

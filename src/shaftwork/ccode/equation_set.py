@@ -8,9 +8,10 @@ from functools import cached_property
 
 from shaftwork.codegen.compiled_model import CompiledModel
 from shaftwork.core.errors import CompileError
-from shaftwork.formulation.explicit_rows import LARGEST_BLOCK, BlockTooLargeError, Rows, explicit_rows
+from shaftwork.formulation.explicit_rows import BlockTooLargeError, Rows, explicit_rows
 from shaftwork.formulation.form import StateForm
 from shaftwork.formulation.observables import Observables
+from shaftwork.network.netlist import listed
 from shaftwork.pipeline.prepared import nominal_tolerances
 
 
@@ -34,15 +35,15 @@ class EquationSet:
         """The state equations as expressions.
 
         Raises:
-            CompileError: too many rates are coupled.
+            CompileError: there is an algebraic loop.
         """
         try:
-            return explicit_rows(self.form)
+            return explicit_rows(self.form, in_numbers=True)
         except BlockTooLargeError:
+            names = listed([self.form.graph.part_of(k).name for k in self.form.loop_laws])
             raise CompileError(
-                f"'{self.form.graph.name}' has no equations line by line: more than {LARGEST_BLOCK} speeds, torques or "
-                "voltages determine each other at once. Give some of their nodes an inertia or a capacitor, put a "
-                "spring between gears, or simulate it here."
+                f"'{self.form.graph.name}' has an algebraic loop through {names}. Give the node of that part an "
+                "inertia or a capacitor."
             ) from None
 
     @cached_property

@@ -181,6 +181,8 @@ class SetFunctions:
 def function_of_sets(name: str, sets: Sequence[Mapping[str, Expr]], statements: Statements) -> str:
     """The function of all sets of equations: each row and each term once, in a block for the sets that need it.
 
+    A term is read in sets that need it alone: blocks of more sets come first.
+
     Args:
         name: of the function, as in `c_texts.ARGUMENTS`.
         sets: what each of them assigns, target to expression.
@@ -190,38 +192,49 @@ def function_of_sets(name: str, sets: Sequence[Mapping[str, Expr]], statements: 
     for number, one in enumerate(sets):
         for row in one.items():
             rows[row] = rows.get(row, 0) | 1 << number
-    terms, codes = statements.in_terms([expression for _, expression in rows])
-    lines = [(target, code, need) for ((target, _), need), code in zip(rows.items(), codes, strict=True)]
-    needs = dict.fromkeys(terms, 0)
-    for _, code, need in lines:
-        needs |= {term: needs[term] | need for term in TERM.findall(code)}
-    for reader, code in reversed(terms.items()):
-        needs |= {term: needs[term] | needs[reader] for term in TERM.findall(code)}
-    lines = [*((term, code, needs[term]) for term, code in terms.items()), *lines]
+    code = statements.code_of([expression for _, expression in rows])
+    lines = [(target, value, need) for ((target, _), need), value in zip(rows.items(), code.values, strict=True)]
+    needs = dict.fromkeys((*code.systems, *code.terms), 0)
+    for _, value, need in lines:
+        needs |= {term: needs[term] | need for term in TERM.findall(value)}
+    for reader, value in reversed(code.terms.items()):
+        needs |= {term: needs[term] | needs[reader] for term in TERM.findall(value)}
+    for reader, text in reversed(code.systems.items()):  # which have terms of their own
+        needs |= {term: needs[term] | needs[reader] for term in TERM.findall("".join(text)) if term in code.systems}
+    lines = [*((term, value, needs[term]) for term, value in code.terms.items()), *lines]
     always = (1 << len(sets)) - 1
-    reads = ((term, need) for _, code, need in lines for term in TERM.findall(code))
+    reads = ((term, need) for _, value, need in lines for term in TERM.findall(value) if term in code.terms)
     crossing = dict.fromkeys(term for term, need in reads if needs[term] not in (need, always))
-    blocks: dict[int, list[str]] = {always: []}
-    for target, code, need in lines:
-        head = "const double " if target in terms and target not in crossing else ""
-        blocks.setdefault(need, []).append(f"{head}{target} = {code};")
-    return _in_blocks(name, [f"double {term} = 0.0;" for term in crossing], blocks, len(sets))
+    together: dict[int, list[str]] = {}
+    for target, value, need in lines:
+        head = "const double " if target in needs and target not in crossing else ""
+        together.setdefault(need, []).append(f"{head}{target} = {value};")
+    blocks: list[tuple[int, Sequence[str]]] = []
+    for vector, (declaration, *solved) in code.systems.items():
+        blocks += [(always, [declaration]), (needs[vector], solved)]
+    blocks.append((always, [f"double {term} = 0.0;" for term in crossing]))
+    return _in_blocks(name, blocks + sorted(together.items(), key=lambda block: -block[0].bit_count()), len(sets))
 
 
-def _in_blocks(name: str, first: Sequence[str], blocks: Mapping[int, Sequence[str]], count: int) -> str:
-    """A function of blocks; a term is read in sets that need it alone, so that blocks of more sets come first."""
-    (_, lines), *some = sorted(blocks.items(), key=lambda block: -block[0].bit_count())
-    if not some:
-        return function(signature(name), lines)
+def _in_blocks(name: str, blocks: Sequence[tuple[int, Sequence[str]]], count: int) -> str:
+    """A function of blocks, of which each stands beside the sets that need it, all or some, as bits of a number."""
+    some = [*dict.fromkeys(need for need, _ in blocks if need != (1 << count) - 1)]
     size, table = 32, f"BLOCKS_OF_{name.upper()}"  # bits of a number
     words = -(-len(some) // size)
-    members = [sum((need >> number & 1) << k for k, (need, _) in enumerate(some)) for number in range(count)]
+    lines = [f"const uint32_t *const needs = {table} + {words} * m->set;"] if some else []
+    for need, block in blocks:
+        if need in some:
+            word, bit = divmod(some.index(need), size)
+            lines += [f"if ((needs[{word}] >> {bit} & 1u) != 0u) {{", *(f"    {line}" for line in block), "}"]
+        else:
+            lines += block
+    text = function(signature(name), lines)
+    if not some:
+        return text
+    members = [sum((need >> number & 1) << k for k, need in enumerate(some)) for number in range(count)]
     bits = [f"0x{member >> size * word & (1 << size) - 1:x}u" for member in members for word in range(words)]
-    lines = [f"const uint32_t *const needs = {table} + {words} * m->set;", *first, *lines]
-    for k, (_, block) in enumerate(some):
-        lines += [f"if ((needs[{k // size}] >> {k % size} & 1u) != 0u) {{", *(f"    {line}" for line in block), "}"]
     comment = f"/* Of each set of equations the blocks of `{name}` that it needs, as bits. */\n"
-    return comment + array("const uint32_t", table, bits) + "\n" + function(signature(name), lines)
+    return f"{comment}{array('const uint32_t', table, bits)}\n{text}"
 
 
 def take_up_of_sets(sets: Sequence[SetFunctions]) -> str:

@@ -153,7 +153,7 @@ class CodeWriter:
         body.append(take_up_of_sets(functions))
         body += modes.texts(functions, statements) if modes else [runtime("no_modes.c")]
         body.append(Instants(self._model.form.graph, still).text(statements))
-        text = "\n".join(body)
+        text = "\n".join([*(text for _, text in statements.matrices.values()), *body])
         tables = [
             array("const double", f"TABLE_{k}_{axis}", [*map(repr, points)])
             for table, k in statements.tables.items()

@@ -1,12 +1,14 @@
 """The state equations row by row as sympy expressions: for small networks, for reading and for scalar code.
 
-The same equations as in `form`, solved symbolically in blocks of coupled unknowns. A network with a larger block is
-left to the sparse matrices of the array program; both are tested to agree.
+The same equations as in `form`, solved symbolically in blocks of coupled unknowns. A larger block is one node of
+expressions where exported code solves it in numbers, and left to the sparse matrices of the array program otherwise;
+all are tested to agree.
 """
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -19,6 +21,7 @@ from shaftwork.components.laws import replaced
 from shaftwork.components.laws import t as TIME
 from shaftwork.formulation.form import StateForm
 from shaftwork.formulation.gains import exact_of
+from shaftwork.formulation.linear_systems import LinearSystem
 from shaftwork.formulation.tree import Row
 from shaftwork.network.graph import GROUND, Reading, readings_of
 from shaftwork.network.kinds import Kind
@@ -58,20 +61,26 @@ class Rows:
     through: Mapping[int, Expr]
 
 
-def explicit_rows(form: StateForm) -> Rows:
+def explicit_rows(form: StateForm, *, in_numbers: bool = False) -> Rows:
     """Solve the state form for the rates.
+
+    Args:
+        form: the state form.
+        in_numbers: whether unknowns of large blocks may stand in the rows, as symbols that have a `LinearSystem`.
 
     Raises:
         BlockTooLargeError: more than `LARGEST_BLOCK` unknowns are coupled, or they are coupled by nonlinear laws.
     """
     if form.loop_laws:
         raise BlockTooLargeError
-    return _Solution(form).rows()
+    return _Solution(form, in_numbers=in_numbers).rows()
 
 
 class _Solution:
-    def __init__(self, form: StateForm) -> None:
+    def __init__(self, form: StateForm, *, in_numbers: bool) -> None:
         self.form, self.graph = form, form.graph
+        self.large = self._in_numbers if in_numbers else refused
+        self.systems: list[LinearSystem] = []
         self.states = tuple(Symbol(state.name, real=True) for state in form.states)
         carried = zip(form.states, self.states, strict=True)
         symbols = {(state.kind, state.branch): symbol for state, symbol in carried}
@@ -146,6 +155,15 @@ class _Solution:
         """Controlled sources by what they read; until then a symbol stands for each."""
         controls = {self.across[k]: replaced(self.form.law_of(k), self.read(k)) for k in self.form.controlled}
         self.across = {k: replaced(across, controls) for k, across in self.across.items()} if controls else self.across
+        for system in self.systems:
+            system.right[:] = [replaced(side, controls) for side in system.right]
+
+    def _in_numbers(self, matrix: Entries, block: Sequence[int], right: Mapping[int, Expr]) -> tuple[Expr, ...]:
+        """The unknowns of one block as they are, for code that solves for them."""
+        place = {unknown: k for k, unknown in enumerate(block)}
+        entries = {(place[row], place[column]): entry for (row, column), entry in matrix.items() if row in place}
+        self.systems.append(LinearSystem(entries, [right[unknown] for unknown in block]))
+        return self.systems[-1].unknowns
 
     def _solve_conductances(self, sources: Sequence[int]) -> None:
         form = self.form
@@ -162,7 +180,7 @@ class _Solution:
             for tree, gain in row:
                 right[tree] -= gain * g * drive
         matrix = congruence({tree: self.form.law_of(tree) for tree in unknowns}, links)
-        self.across.update(zip(unknowns, solve_blocks(matrix, unknowns, right), strict=True))
+        self.across.update(zip(unknowns, solve_blocks(matrix, unknowns, right, self.large), strict=True))
 
     def _speed_rates(self) -> tuple[Expr, ...]:
         form = self.form
@@ -171,7 +189,7 @@ class _Solution:
         right = {tree: -self.out_of(tree, links) for tree in unknowns}
         ties = [self._tie(link, self.form.law_of(link), right.keys()) for link in form.dependent_across]
         ties += [self._tie(link, capacity, right.keys()) for link, capacity in self.beyond.items()]
-        return solve_tied({tree: self.form.law_of(tree) for tree in unknowns}, ties, right)
+        return solve_tied({tree: self.form.law_of(tree) for tree in unknowns}, ties, right, self.large)
 
     def _tie(self, link: int, capacity: Expr, unknowns: Container[int]) -> Tie:
         """A dependent store, or what one has beyond a constant, as what it does to the stores that carry it."""
@@ -199,9 +217,8 @@ class _Solution:
             springs.append((row, compliance, states))
             for link, gain in row:
                 right[link] -= gain * compliance * source
-        return solve_blocks(
-            congruence({link: 1 / self.form.law_of(link) for link in unknowns}, springs), unknowns, right
-        )
+        matrix = congruence({link: 1 / self.form.law_of(link) for link in unknowns}, springs)
+        return solve_blocks(matrix, unknowns, right, self.large)
 
 
 def _exact(form: StateForm, rows: Mapping[int, Row]) -> dict[int, tuple[tuple[int, Expr], ...]]:
@@ -226,6 +243,11 @@ Link = tuple[Members, Expr, Members]
 """What is not among the unknowns but acts on them: how it enters their rows, its coefficient, what it reads of them."""
 
 
+Entries = Mapping[tuple[int, int], Expr]
+SolveBlock = Callable[[Entries, Sequence[int], Mapping[int, Expr]], Iterable[Expr]]
+"""The unknowns of a block, from the entries of a matrix, the numbers of the unknowns and the right sides."""
+
+
 class BlockTooLargeError(Exception):
     """The rows have no closed form that anyone would read."""
 
@@ -247,7 +269,14 @@ class Tie:
     prescribed: Expr
 
 
-def solve_tied(capacities: Mapping[int, Expr], ties: Sequence[Tie], right: Mapping[int, Expr]) -> tuple[Expr, ...]:
+def refused(_entries: Entries, _block: Sequence[int], _right: Mapping[int, Expr]) -> Iterable[Expr]:
+    """Of a block that is too large, for what needs closed forms."""
+    raise BlockTooLargeError
+
+
+def solve_tied(
+    capacities: Mapping[int, Expr], ties: Sequence[Tie], right: Mapping[int, Expr], large: SolveBlock = refused
+) -> tuple[Expr, ...]:
     """Solve capacities x + shares y = right for the rates x of stores, where y are the reactions of dependent ones.
 
     Law: few unknowns are solved for with y put in. Of many that are tied by few, the reactions are solved for,
@@ -255,17 +284,18 @@ def solve_tied(capacities: Mapping[int, Expr], ties: Sequence[Tie], right: Mappi
     from them by itself.
 
     Raises:
-        BlockTooLargeError: neither has a block of `LARGEST_BLOCK` or fewer.
+        BlockTooLargeError: neither has blocks of `LARGEST_BLOCK` or fewer alone, and `large` refuses others.
     """
     driven = dict(right)
     for tie in ties:
         for tree, share in tie.shares.items():
             driven[tree] -= share * tie.capacity * tie.prescribed
     matrix = congruence(capacities, ((tie.shares.items(), tie.capacity, tie.row.items()) for tie in ties))
-    try:
+    with suppress(BlockTooLargeError):
         return solve_blocks(matrix, tuple(capacities), driven)
-    except BlockTooLargeError:
+    with suppress(BlockTooLargeError):
         return _by_reactions(capacities, ties, right)
+    return solve_blocks(matrix, tuple(capacities), driven, large)
 
 
 def _by_reactions(capacities: Mapping[int, Expr], ties: Sequence[Tie], right: Mapping[int, Expr]) -> tuple[Expr, ...]:
@@ -306,12 +336,12 @@ def congruence(coefficients: Mapping[int, Expr], links: Iterable[Link]) -> dict[
 
 
 def solve_blocks(
-    matrix: Mapping[tuple[int, int], Expr], unknowns: Sequence[int], right: Mapping[int, Expr]
+    matrix: Entries, unknowns: Sequence[int], right: Mapping[int, Expr], large: SolveBlock = refused
 ) -> tuple[Expr, ...]:
-    """Solve a sparse symbolic system block by block of coupled unknowns.
+    """Solve a sparse symbolic system block by block of coupled unknowns; `large` solves those beyond `LARGEST_BLOCK`.
 
     Raises:
-        BlockTooLargeError: a block has more than `LARGEST_BLOCK` unknowns.
+        BlockTooLargeError: there are such blocks, and `large` refuses them.
     """
     links: nx.Graph[int] = nx.Graph()
     links.add_nodes_from(unknowns)
@@ -320,17 +350,16 @@ def solve_blocks(
     order = {unknown: k for k, unknown in enumerate(unknowns)}
     for component in nx.connected_components(links):
         block = sorted(component, key=order.__getitem__)
-        if len(block) > LARGEST_BLOCK:
-            raise BlockTooLargeError
         if len(block) == 1:
             (only,) = block
             solution[only] = right[only] / matrix[only, only]
             continue
-        solution.update(zip(block, _cramer(matrix, block, right), strict=True))
+        solve = _cramer if len(block) <= LARGEST_BLOCK else large
+        solution.update(zip(block, solve(matrix, block, right), strict=True))
     return tuple(solution[unknown] for unknown in unknowns)
 
 
-def _cramer(matrix: Mapping[tuple[int, int], Expr], block: Sequence[int], right: Mapping[int, Expr]) -> Iterator[Expr]:
+def _cramer(matrix: Entries, block: Sequence[int], right: Mapping[int, Expr]) -> Iterator[Expr]:
     """Solve one block by cofactors.
 
     The cofactors are made of single symbols, and the entries put in afterwards: sympy would otherwise try to cancel

@@ -14,6 +14,7 @@ from shaftwork.core.domains import ROTATION
 from shaftwork.core.errors import CompileError
 from shaftwork.formulation.explicit_rows import BlockTooLargeError, Rows, explicit_rows
 from shaftwork.formulation.form import Names, StateForm
+from shaftwork.formulation.linear_systems import LinearSystem, systems_in
 from shaftwork.formulation.observables import Observables
 from shaftwork.modelica.component_writer import experiment
 from shaftwork.modelica.modelica_expressions import (
@@ -67,17 +68,16 @@ def flat_text(form: StateForm, start: Mapping[str, float], t_end: float, turned:
         turned: quantities that sources of `in_one_mode` show with the other sign.
 
     Raises:
-        CompileError: a shaft is a travelling wave, too many unknowns are coupled, or a law has no counterpart.
+        CompileError: a shaft is a travelling wave, laws determine each other, or a law has no counterpart.
     """
     graph = form.graph
     if form.waves:
         raise CompileError(f"'{graph.name}' in one set of equations: a shaft is a travelling wave. {_COMPONENT_FORM}")
     try:
-        rows = explicit_rows(form)
+        rows = explicit_rows(form, in_numbers=True)
     except BlockTooLargeError:
         raise CompileError(
-            f"'{graph.name}' has no explicit equations in symbols: laws determine each other, or too many unknowns are "
-            f"coupled. {_COMPONENT_FORM}"
+            f"'{graph.name}' has no explicit equations in symbols: laws determine each other. {_COMPONENT_FORM}"
         ) from None
     lines = list(_Flat(form, rows, start, turned).lines(t_end))
     name = Identifiers()[graph.name]
@@ -112,12 +112,24 @@ class _Flat:
         units = Names(self._form).units
         for name in shown:
             yield f'  output Real {names[name]}(unit = "{unit(units[name])}") {quoted(name)};'
+        systems = systems_in((*self._rows.rates, *shown.values()))
+        for system in systems:
+            array = self._names.unused("solved")
+            self._printer.names |= {unknown: f"{array}[{k}]" for k, unknown in enumerate(system.unknowns, 1)}
+            yield f'  Real {array}[{len(system.right)}] "Speeds, torques or rates that determine each other";'
         yield "equation"
+        for system in systems:
+            yield from self._coupled(system)
         for state, rate in zip(self._form.states, self._rows.rates, strict=True):
             yield f"  der({self._states[state.name]}) = {self._printer.doprint(rate)};"
         for name, expression in shown.items():
             yield f"  {names[name]} = {self._printer.doprint(expression)};"
         yield f"  {experiment(t_end)}"
+
+    def _coupled(self, system: LinearSystem) -> Iterator[str]:
+        for k, side in enumerate(system.right):
+            row = (entry * system.unknowns[j] for (i, j), entry in system.matrix.items() if i == k)
+            yield f"  {' + '.join(map(self._printer.doprint, row))} = {self._printer.doprint(side)};"
 
     def _parameter(self, name: str) -> str:
         owner, _, parameter = name.rpartition(".")
