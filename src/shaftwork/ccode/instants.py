@@ -4,13 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from sympy import Abs, Expr, Max, Min, Mul, Piecewise, Pow, Symbol, asin, cos, floor, pi, simplify, sin
+from sympy import (
+    Abs,
+    Add,
+    Dummy,
+    Expr,
+    Heaviside,
+    Max,
+    Min,
+    Mul,
+    Piecewise,
+    Pow,
+    Symbol,
+    asin,
+    cos,
+    floor,
+    pi,
+    sign,
+    simplify,
+    sin,
+)
 
 from shaftwork.ccode.c_printing import Statements, array, function
 from shaftwork.components.discontinuities import line, narrow_places, switches, unsolved_places
 from shaftwork.components.law_slopes import MOST_DEGREE
 from shaftwork.components.laws import replaced
 from shaftwork.components.laws import t as TIME
+from shaftwork.components.noise import SmoothNoise
 from shaftwork.core.errors import CompileError
 from shaftwork.network.graph import CircuitGraph
 from shaftwork.network.kinds import Kind
@@ -36,6 +56,8 @@ class Instants:
         """Lines in time, and the levels at which something switches."""
         self.whole: dict[Straight, None] = {}
         """Lines in time that switch at every whole number."""
+        self.noises: dict[Expr, Expr] = {}
+        """Functions of smooth noise that switch as they pass zero, and how often each second the noise is told."""
         for part, argument, levels in self._arguments():
             if argument.has(TIME) and argument.free_symbols <= self._still:
                 self._sort(part, argument, levels)
@@ -84,40 +106,44 @@ class Instants:
                     self.levels[straight, (0.0,)] = None
                 elif (passes := _passes(factor)) is not None:
                     self.whole.update(dict.fromkeys(passes))
+                elif (rate := _rate_of_noise(factor)) is not None:
+                    self.noises[factor] = rate
                 else:
                     raise _unsolved(part, f"it switches as {factor} passes zero")
 
     def text(self, statements: Statements) -> str:
         """The C function `next_time`."""
         tables, lines = list[str](), ["double next = INFINITY;"]
+
+        def add(numbers: dict[str, Expr], call: str) -> None:
+            values = statements.assigned([f"const double {name}" for name in numbers], [*numbers.values()])
+            lines.extend(["{", *(f"    {line}" for line in values), f"    next = fmin(next, {call});", "}"])
+
         for number, ((slope, offset), levels) in enumerate(self.levels):
             tables.append(array("const double", f"LEVELS_{number}", [repr(float(level)) for level in levels]))
-            lines += self._block(
-                statements, slope, offset, f"next_level(slope, offset, {len(levels)}, LEVELS_{number}, t)"
-            )
+            call = f"next_level(slope, offset, {len(levels)}, LEVELS_{number}, t)"
+            add({"slope": slope, "offset": offset}, call)
         for slope, offset in self.whole:
-            lines += self._block(statements, slope, offset, "next_whole(slope, offset, t)")
+            add({"slope": slope, "offset": offset}, "next_whole(slope, offset, t)")
+        for number, (noise, rate) in enumerate(self.noises.items()):
+            value = [*statements.assigned(["const double value"], [noise]), "return value;"]
+            tables.append(function(f"double noise_{number}(const NAME *m, double t)", value))
+            add({"width": 1 / rate}, f"next_zero(m, noise_{number}, width, t)")
         lines.append("return next;")
         return "\n".join([*tables, function("double next_time(const NAME *m, double t)", lines)])
-
-    @staticmethod
-    def _block(statements: Statements, slope: Expr, offset: Expr, call: str) -> Iterator[str]:
-        yield "{"
-        targets = ["const double slope", "const double offset"]
-        yield from (f"    {line}" for line in statements.assigned(targets, [slope, offset]))
-        yield f"    next = fmin(next, {call});"
-        yield "}"
 
 
 def _factors(expression: Expr) -> Iterator[Expr]:
     """What changes its sign in time where an expression does.
 
-    |x| - a does so where x passes a or -a, and Min(x, y) - a nowhere but where x or y passes it.
+    |x| - a does so where x passes a or -a, Min(x, y) - a nowhere but where x or y passes it, and a step where it steps.
     """
     for factor in Mul.make_args(expression):
         level, moving = factor.as_independent(TIME, as_Add=True)
         size, moving = moving.as_independent(TIME, as_Add=False)
-        if isinstance(moving, Abs):
+        if isinstance(moving, Heaviside | sign):
+            yield from _factors(moving.args[0])
+        elif isinstance(moving, Abs):
             yield from (size * moving.args[0] + level, size * moving.args[0] - level)
         elif isinstance(moving, Max | Min | Piecewise):
             for one in moving.args if not isinstance(moving, Piecewise) else (value for value, _ in moving.args):
@@ -148,6 +174,15 @@ def _passes(expression: Expr) -> tuple[Straight, ...] | None:
     if simplify(moving + height * (slope * TIME - steps[0])) != 0:
         return None
     return ((slope, -level / height),)
+
+
+def _rate_of_noise(expression: Expr) -> Expr | None:
+    """How often each second numbers tell the noise in an expression that depends on the time by it alone, else None."""
+    noises = expression.atoms(SmoothNoise)
+    lines = [line(noise.args[0]) for noise in noises]
+    if None in lines or not noises or expression.xreplace(dict.fromkeys(noises, Dummy())).has(TIME):
+        return None
+    return Add(*(Abs(slope) for slope, _ in filter(None, lines)))
 
 
 def _unsolved(part: str, why: str) -> CompileError:

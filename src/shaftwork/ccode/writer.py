@@ -160,7 +160,7 @@ class CodeWriter:
             for axis, points in (("X", table.xs), ("Y", table.ys))
         ]
         calls = {"points.c": "table", "noise.c": "held_noise("}
-        calls |= {f"{name}.c": f"{name}(" for name in ("table", "table_slope", "next_level", "next_whole")}
+        calls |= {f"{name}.c": f"{name}(" for name in ("table", "table_slope", "next_level", "next_whole", "next_zero")}
         helpers = ["numbers.c"] * (modes is not None or "solve(" in text)
         helpers += [file for file, call in calls.items() if call in text]
         events = ("events.c", "impacts.c", "iteration.c") if modes else ("smooth.c",)
