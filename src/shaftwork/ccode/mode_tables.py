@@ -315,4 +315,5 @@ def _strikes(machine: ModeMachine) -> bool:
 
 
 def _integers(name: str, values: Sequence[int]) -> str:
-    return array("const int", name, [str(int(value)) for value in values])
+    kind = "short" if all(abs(value) < 1 << 15 for value in values) else "int"
+    return array(f"const {kind}", name, [str(int(value)) for value in values])

@@ -113,20 +113,20 @@ class SetFunctions:
         row = {tree: gain for tree, gain in rows[link].items() if tree in self.form.across_states}
         return list(zip(row, exact_of(row.values()), strict=True))
 
-    @cached_property
-    def take_up(self) -> tuple[str, ...]:
-        """Lines that find the states closest to what was stored: see `codegen.state_transfer`."""
-        form, n = self.form, len(self.form.across_states)
-        lines = list[str]()
+    def solved(self) -> tuple[str, ...]:
+        """Lines that find the states that tie others, closest to what was stored: see `codegen.state_transfer`."""
+        lines = ["masses(m, t, stored, mass);", "loads(m, t, stored, right);"] if self.ties else []
+        lines += [f"solve({len(self.form.across_states)}, mass, 1, right);"] if self.ties else []
+        return (*lines, *(self._torques_taken_up() if self._slack else ()))
+
+    def taken(self) -> Iterator[str]:
+        """Lines that put these states in their places, and all others as they were stored."""
         if self.ties:
-            lines += ["double mass[NX * NX] = {0.0}, right[NX];", "masses(m, t, stored, mass);"]
-            lines += ["loads(m, t, stored, right);", f"solve({n}, mass, 1, right);"]
-            lines += (f"x[{place}] = right[{k}];" for k, place in enumerate(self.places[form.speeds]))
-        lines += self._torques_taken_up() if self._slack else []
-        tied = {"across": self.ties, "through": self._slack, "integral": ()}
-        free = [(place, state) for place, state in zip(self.places, form.states, strict=True) if not tied[state.kind]]
-        lines += self.assigned([f"x[{place}]" for place, _ in free], [stored_symbol(state.name) for _, state in free])
-        return tuple(lines)
+            yield from (f"x[{place}] = right[{k}];" for k, place in enumerate(self.places[self.form.speeds]))
+        tied = {"across": self.ties, "through": self._slack, "integral": False}
+        pairs = zip(self.places, self.form.states, strict=True)
+        free = {f"x[{place}]": stored_symbol(state.name) for place, state in pairs if not tied[state.kind]}
+        yield from self.assigned([*free], [*free.values()])
 
     def _loads(self) -> Iterator[tuple[str, Expr]]:
         """(C + Q K F') x = C v + Q K (v_K - F_E' e): the right-hand side."""
@@ -238,16 +238,20 @@ def _in_blocks(name: str, blocks: Sequence[tuple[int, Sequence[str]]], count: in
 
 
 def take_up_of_sets(sets: Sequence[SetFunctions]) -> str:
-    """The function `take_up` of all sets of equations, of which several say the same."""
-    cases: dict[tuple[str, ...], list[str]] = {}
+    """The function `take_up` of all sets of equations."""
+    solved, taken = dict[tuple[str, ...], int](), dict[str, int]()
     for number, one in enumerate(sets):
-        cases.setdefault(one.take_up, []).append(f"case {number}:")
-    lines = list[str]()
-    for body, labels in cases.items():
-        lines += [" ".join(labels) + " {", *(f"    {line}" for line in body), "    break;", "}"]
-    if len(sets) == 1:
-        return function(signature("take_up"), sets[0].take_up)
-    return function(signature("take_up"), ["switch (m->set) {", *lines, "default: break;", "}"])
+        solved[one.solved()] = solved.get(one.solved(), 0) | 1 << number
+        for line in one.taken():
+            taken[line] = taken.get(line, 0) | 1 << number
+    always = (1 << len(sets)) - 1
+    blocks: list[tuple[int, Sequence[str]]] = [(need, lines) for lines, need in solved.items() if lines]
+    blocks += [
+        (need, [line for line, other in taken.items() if other == need]) for need in dict.fromkeys(taken.values())
+    ]
+    if any(one.ties for one in sets):
+        blocks.insert(0, (always, ["double mass[NX * NX] = {0.0}, right[NX] = {0.0};"]))
+    return _in_blocks("take_up", blocks, len(sets))
 
 
 def stored_symbol(name: str) -> Symbol:
