@@ -178,12 +178,24 @@ FOLLOWED = {
     "a smooth root": 3 * sqrt(1 + T**2),
     "clipped smooth noise": Max(0, 1 + 20 * sw.SmoothNoise(T / 0.05, 3)),
     "a switch at a level of smooth noise": Piecewise((40.0, sw.SmoothNoise(T / 0.05, 2) > 0.7), (0.0, True)),
+    "noise cut off at a level": Max(0.4, sw.SmoothNoise(T / 0.05, 3)) - Min(0.0, 0.1 + sw.SmoothNoise(0.2 - 7 * T, 5)),
 }
 
 
 @pytest.mark.parametrize("name", FOLLOWED)
 def test_laws_that_switch_for_less_than_a_step_are_followed(name: str, tmp_path: Path) -> None:
     assert_moves_as_in_the_library(two_masses(FOLLOWED[name]), 1.0, tmp_path)
+
+
+def test_a_chopper_switches_at_the_edges_of_its_pulses(tmp_path: Path) -> None:
+    net = sw.Network("chopper")
+    net.add(sw.VoltageSource("battery", u=40.0), "plus", "minus")
+    net.add(sw.Switch("chop", on=sw.PWM(0.6, 100.0)), "plus", "x")
+    net.add(sw.Diode("idle"), "minus", "x")
+    net.add(sw.DCMachine("M", k=0.3, R=0.7, L=0.01), "x", "minus", "rotor")
+    net.add(sw.Ground("earth"), "minus")
+    net.add(sw.Inertia("J", J=0.02), "rotor")
+    assert assert_moves_as_in_the_library(net, 0.1, tmp_path).struct.events >= 20
 
 
 @pytest.mark.parametrize(

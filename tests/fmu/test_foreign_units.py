@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import copy
 import pickle
+import re
 import shutil
 import zipfile
 from pathlib import Path
@@ -230,6 +231,7 @@ def test_a_wrong_name_is_answered_with_those_that_exist(spring: Path, options: d
     [
         ({**TORQUE, "kind": "CoSimulation"}, "co-simulation alone.*model.start"),
         ({**TORQUE, "indicators": "2"}, "2 event indicators"),
+        ({**TORQUE, "torque": 'output" variability="discrete'}, "torque names 'tau', which changes at events alone"),
     ],
 )
 def test_what_a_right_hand_side_cannot_evaluate_is_refused(tmp_path: Path, says: dict[str, str], message: str) -> None:
@@ -277,6 +279,23 @@ def test_a_binary_that_cannot_be_loaded_leaves_the_working_directory(
     with pytest.raises(sw.SimulationError, match="Failed to load"):
         net.simulate(0.1)
     assert Path.cwd() == tmp_path
+
+
+def test_a_binary_of_another_export_is_told_by_the_number_of_its_states(tmp_path: Path) -> None:
+    """A rate is left out of the ModelStructure, as if the description were that of an older network."""
+    path, other = tmp_path / "unit.fmu", tmp_path / "other.fmu"
+    two_masses().compile().to_fmu(path, inputs=["motor.tau"], outputs=["J1.omega"])
+    with zipfile.ZipFile(path) as source, zipfile.ZipFile(other, "w") as target:
+        for name in source.namelist():
+            text = source.read(name)
+            if name == "modelDescription.xml":
+                text = re.sub(r"<ContinuousStateDerivative .*?/>", "", text.decode(), count=1).encode()
+            target.writestr(name, text)
+    net = driven()
+    net.add(sw.Spring("shaft", c=50.0), "rotor", "flange")
+    net.add(sw.FMUSpeed("rest", fmu=sw.FMU(other, speed="J1.omega", torque="motor.tau")), "flange")
+    with pytest.raises(sw.SimulationError, match=r"other.fmu' has 3 continuous states, but .* tells 2"):
+        net.simulate(0.1)
 
 
 @pytest.mark.parametrize(("path", "start"), [(3, {}), (None, {}), ("spring.fmu", 3)])

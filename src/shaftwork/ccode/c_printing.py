@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from sympy import Basic, Expr, Mod, Piecewise, Pow, Symbol, true
 from sympy.printing.codeprinter import PrintMethodNotImplementedError
@@ -18,6 +18,8 @@ from shaftwork.formulation.coupled_blocks import CoupledBlock, blocks_in
 
 LARGEST_PRODUCT = 4
 """Powers up to this one of a plain name are products: `pow` takes ten times as long."""
+TERM = re.compile(r"\b(?:s|solved_)\d+\b")
+"""The name of what stands in expressions more than once, or of the solution of a linear system."""
 
 
 class TablePrinter(CPrinter):
@@ -70,7 +72,7 @@ class TablePrinter(CPrinter):
 
 
 class Statements:
-    """Writes expressions as assignments, what stands in them more than once first.
+    """Writes expressions as assignments.
 
     Args:
         names: C code of every symbol.
@@ -84,24 +86,30 @@ class Statements:
         """Name and text of the function of each matrix, by its identity."""
 
     def assigned(self, targets: Sequence[str], expressions: Sequence[Expr]) -> Iterator[str]:
-        """The lines that assign expressions to targets.
+        """The lines that assign expressions to targets, what stands in them more than once first."""
+        code = self.code_of(expressions)
+        for lines in code.systems.values():
+            yield from lines
+        yield from (f"const double {term} = {value};" for term, value in code.terms.items())
+        yield from (f"{target} = {value};" for target, value in zip(targets, code.values, strict=True))
+
+    def code_of(self, expressions: Sequence[Expr]) -> InTerms:
+        """Expressions in terms that stand in them more than once, and in what linear systems of equations tell.
 
         Raises:
             CompileError: C has no such function.
         """
-        names = dict(self._names)
+        names, systems = dict(self._names), dict[str, list[str]]()
         for number, system in enumerate(blocks_in(expressions)):
             n, vector = len(system.right), f"solved_{number}"
-            yield f"double {vector}[{n}];"
-            yield "{"
-            yield f"    double matrix[{n * n}] = {{0.0}};"
-            yield f"    {self._matrix(system)}(m, t, x, matrix);"
-            sides = {f"{vector}[{k}]": side for k, side in enumerate(system.right)}
-            yield from (f"    {line}" for line in self._assigned(names, sides))
-            yield f"    solve({n}, matrix, 1, {vector});"
-            yield "}"
+            terms, sides = self._in_terms(names, system.right)
+            lines = [f"double matrix[{n * n}] = {{0.0}};", f"{self._matrix(system)}(m, t, x, matrix);"]
+            lines += (f"const double {term} = {code};" for term, code in terms.items())
+            lines += (f"{vector}[{k}] = {side};" for k, side in enumerate(sides))
+            lines.append(f"solve({n}, matrix, 1, {vector});")
+            systems[vector] = [f"double {vector}[{n}] = {{0.0}};", "{", *(f"    {line}" for line in lines), "}"]
             names |= {unknown: f"{vector}[{k}]" for k, unknown in enumerate(system.unknowns)}
-        yield from self._assigned(names, dict(zip(targets, expressions, strict=True)))
+        return InTerms(systems, *self._in_terms(names, expressions))
 
     def _matrix(self, system: CoupledBlock) -> str:
         """The name of the function that fills in the matrix of a system; its derivatives have the same one."""
@@ -112,18 +120,29 @@ class Statements:
             self.matrices[id(system.matrix)] = name, function(head, [*lines])
         return self.matrices[id(system.matrix)][0]
 
-    def _assigned(self, names: Mapping[Symbol, str], values: Mapping[str, Expr]) -> Iterator[str]:
-        plain = [_in_pieces(expression) for expression in values.values()]
+    def _in_terms(self, names: Mapping[Symbol, str], expressions: Sequence[Expr]) -> tuple[dict[str, str], list[str]]:
+        plain = [_in_pieces(expression) for expression in expressions]
         printer = TablePrinter(names, self.tables)
         try:
-            for name, code in shared_parts(printer, plain).items():
-                yield f"const double {name} = {code};"
-            for target, expression in zip(values, plain, strict=True):
-                yield f"{target} = {printer.doprint(expression)};"
+            return shared_parts(printer, plain, scaled=False), [printer.doprint(expression) for expression in plain]
         except PrintMethodNotImplementedError as error:
             raise CompileError(
                 f"'{self._title}' has a law that C has no function for: {error}. Write it with others, or as a Table."
             ) from None
+
+
+class InTerms(NamedTuple):
+    """The code of expressions.
+
+    Args:
+        systems: lines that declare and fill in a vector, the solution of a linear system, by its name.
+        terms: code of what stands in the expressions more than once, by its name.
+        values: code of the expressions.
+    """
+
+    systems: dict[str, list[str]]
+    terms: dict[str, str]
+    values: list[str]
 
 
 def _in_pieces(expression: Expr) -> Expr:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 
-from shaftwork.ccode.c_printing import function, text_of
+from shaftwork.ccode.c_printing import text_of
 
 ARGUMENTS = {
     "rates": ("x", "dx"),
@@ -20,26 +20,16 @@ ARGUMENTS = {
     "across": ("x", "speeds"),
     "begins": ("x", "holds"),
     "masses": ("x", "mass"),
+    "loads": ("stored", "right"),
     "shares": ("x", "gains"),
 }
-"""Functions of which each set of equations has its own: the array that each reads, and that which it fills."""
+"""Functions that differ by the set of equations: the array that each reads, and that which it fills."""
 
 
-def signature(name: str, suffix: str = "") -> str:
+def signature(name: str) -> str:
     """How a function of `ARGUMENTS` is declared."""
     read, filled_in = ARGUMENTS[name]
-    return f"void {name}{suffix}(const NAME *m, double t, const double *restrict {read}, double *restrict {filled_in})"
-
-
-def dispatcher(name: str, count: int) -> str:
-    """The function that calls that of the set of equations of an instance."""
-    call = ", ".join(("m", "t", *ARGUMENTS[name]))
-    if count == 1:
-        lines = [f"{name}_0({call});"]
-    else:
-        cases = (f"case {k}: {name}_{k}({call}); break;" for k in range(1, count))
-        lines = ["switch (m->set) {", *cases, f"default: {name}_0({call}); break;", "}"]
-    return function(signature(name), lines)
+    return f"void {name}(const NAME *m, double t, const double *restrict {read}, double *restrict {filled_in})"
 
 
 def names_of(kind: str, what: str, texts: Sequence[str]) -> str:

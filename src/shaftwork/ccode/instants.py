@@ -4,7 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from sympy import Abs, Expr, Float, Integer, Max, Min, Mul, Piecewise, Pow, Symbol, asin, cos, floor, pi, simplify, sin
+from sympy import (
+    Abs,
+    Expr,
+    Float,
+    Heaviside,
+    Integer,
+    Max,
+    Min,
+    Mul,
+    Piecewise,
+    Pow,
+    Symbol,
+    asin,
+    cos,
+    floor,
+    pi,
+    sign,
+    simplify,
+    sin,
+)
 
 from shaftwork.ccode.c_printing import Statements, array, function
 from shaftwork.components.discontinuities import line, narrow_places, switches, unsolved_places
@@ -126,12 +145,14 @@ class Instants:
 def _factors(expression: Expr) -> Iterator[Expr]:
     """What changes its sign in time where an expression does.
 
-    |x| - a does so where x passes a or -a, and Min(x, y) - a nowhere but where x or y passes it.
+    |x| - a does so where x passes a or -a, Min(x, y) - a nowhere but where x or y passes it, and a step where it steps.
     """
     for factor in Mul.make_args(expression):
         level, moving = factor.as_independent(TIME, as_Add=True)
         size, moving = moving.as_independent(TIME, as_Add=False)
-        if isinstance(moving, Abs):
+        if isinstance(moving, Heaviside | sign):
+            yield from _factors(moving.args[0])
+        elif isinstance(moving, Abs):
             yield from (size * moving.args[0] + level, size * moving.args[0] - level)
         elif isinstance(moving, Max | Min | Piecewise):
             for one in moving.args if not isinstance(moving, Piecewise) else (value for value, _ in moving.args):

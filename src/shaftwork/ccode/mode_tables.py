@@ -14,7 +14,7 @@ from sympy import Expr, Float, Integer, Piecewise
 from shaftwork.ccode.c_printing import Statements, array, function, text_of
 from shaftwork.ccode.c_texts import runtime
 from shaftwork.ccode.equation_set import EquationSet
-from shaftwork.ccode.set_functions import SetFunctions, functions_of_sets
+from shaftwork.ccode.set_functions import SetFunctions, function_of_sets
 from shaftwork.codegen.state_transfer import WITHOUT_INERTIA, StateTransfer
 from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH
 from shaftwork.components.laws import t as TIME
@@ -135,7 +135,7 @@ class ModeTables:
         texts = [runtime("modes.c"), *self._tables()]
         assignments = [self._assignments(*pair) for pair in zip(functions, self._guards, strict=True)]
         for name in assignments[0]:
-            texts += functions_of_sets(name, [one[name] for one in assignments], statements)
+            texts += [function_of_sets(name, [one[name] for one in assignments], statements)]
         return [*texts, self._leave_numbers(functions[0], statements)]
 
     def _assignments(self, one: SetFunctions, guards: ModeGuards) -> Mapping[str, Mapping[str, Expr]]:
@@ -315,4 +315,5 @@ def _strikes(machine: ModeMachine) -> bool:
 
 
 def _integers(name: str, values: Sequence[int]) -> str:
-    return array("const int", name, [str(int(value)) for value in values])
+    kind = "short" if all(abs(value) < 1 << 15 for value in values) else "int"
+    return array(f"const {kind}", name, [str(int(value)) for value in values])

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from sympy import Add, Expr, Float, Integer, Symbol
 
-from shaftwork.ccode.c_printing import Statements, function
-from shaftwork.ccode.c_texts import ARGUMENTS, dispatcher, signature
+from shaftwork.ccode.c_printing import TERM, Statements, array, function
+from shaftwork.ccode.c_texts import signature
 from shaftwork.ccode.equation_set import EquationSet
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.law_slopes import slope
@@ -33,34 +33,31 @@ class ArrayLayout:
         states: names of the states of all sets of equations.
         stores: names of everything that is stored.
         outputs: names of the outputs.
-        has_modes: whether there are impacts, which need the inertias of the states.
         statements: writes expressions.
     """
 
     states: tuple[str, ...]
     stores: tuple[str, ...]
     outputs: tuple[str, ...]
-    has_modes: bool
     statements: Statements
 
 
 class SetFunctions:
-    """The functions of one set of equations.
+    """What the functions compute in one set of equations.
 
     Args:
-        number: of the set.
         equations: the set.
         layout: of all sets.
     """
 
-    def __init__(self, number: int, equations: EquationSet, layout: ArrayLayout) -> None:
-        self.number, self.layout = number, layout
+    def __init__(self, equations: EquationSet, layout: ArrayLayout) -> None:
+        self.layout = layout
         self.form, self.rows, self.observables = equations.form, equations.rows, equations.observables
         self.places = [layout.states.index(state.name) for state in self.form.states]
         """Where its states are among those of all sets."""
 
     @property
-    def _ties(self) -> bool:
+    def ties(self) -> bool:
         """Whether inertias among the states carry others."""
         return bool(self.form.dependent_across and self.form.across_states)
 
@@ -74,19 +71,8 @@ class SetFunctions:
         """By the name of a function what it assigns, target to expression."""
         outputs = {f"y[{k}]": self.observables.quantity(name) for k, name in enumerate(self.layout.outputs)}
         stored = {f"stored[{k}]": self.observables.store(name) for k, name in enumerate(self.layout.stores)}
-        masses = {"masses": self._masses()} if self.layout.has_modes else {}
-        return {"rates": self._rates(), "jacobian": self._jacobian(), "outputs": outputs, "stores": stored} | masses
-
-    @cached_property
-    def text(self) -> str:
-        """The functions that no other set shares."""
-        masses = self._masses() if self._ties and not self.layout.has_modes else None
-        inertias = [self._function("masses", self.assigned([*masses], [*masses.values()]))] if masses else []
-        return "\n".join([*inertias, self._take_up(), self._samples()])
-
-    def _function(self, name: str, lines: Iterable[str]) -> str:
-        """A function of this set: its name ends with the number of the set."""
-        return function(signature(name, f"_{self.number}"), [*lines])
+        moving = {"rates": self._rates(), "jacobian": self._jacobian()}
+        return {**moving, "outputs": outputs, "stores": stored, "masses": self._masses(), "loads": dict(self._loads())}
 
     def assigned(self, targets: Sequence[str], expressions: Sequence[Expr]) -> Iterator[str]:
         """Lines that assign expressions to targets."""
@@ -133,19 +119,24 @@ class SetFunctions:
         row = {tree: gain for tree, gain in rows[link].items() if tree in self.form.across_states}
         return list(zip(row, exact_of(row.values()), strict=True))
 
-    def _take_up(self) -> str:
-        """The states that take up what was stored with the least change: see `codegen.state_transfer`."""
-        form = self.form
-        lines = [*self._speeds_taken_up()] if self._ties else []
-        lines += self._torques_taken_up() if self._slack else []
-        tied = {"across": self._ties, "through": self._slack, "integral": ()}
-        free = [(place, state) for place, state in zip(self.places, form.states, strict=True) if not tied[state.kind]]
-        lines += self.assigned([f"x[{place}]" for place, _ in free], [stored_symbol(state.name) for _, state in free])
-        return self._function("take_up", lines)
+    def solved(self) -> tuple[str, ...]:
+        """Lines that find the states that tie others, closest to what was stored: see `codegen.state_transfer`."""
+        lines = ["masses(m, t, stored, mass);", "loads(m, t, stored, right);"] if self.ties else []
+        lines += [f"solve({len(self.form.across_states)}, mass, 1, right);"] if self.ties else []
+        return (*lines, *(self._torques_taken_up() if self._slack else ()))
 
-    def _samples(self) -> str:
-        """What sampled controllers hold after an instant: see `components.sampling`."""
-        graph, lines = self.form.graph, list[str]()
+    def taken(self) -> Iterator[str]:
+        """Lines that put these states in their places, and all others as they were stored."""
+        if self.ties:
+            yield from (f"x[{place}] = right[{k}];" for k, place in enumerate(self.places[self.form.speeds]))
+        tied = {"across": self.ties, "through": self._slack, "integral": False}
+        pairs = zip(self.places, self.form.states, strict=True)
+        free = {f"x[{place}]": stored_symbol(state.name) for place, state in pairs if not tied[state.kind]}
+        yield from self.assigned([*free], [*free.values()])
+
+    def samples(self) -> Iterator[tuple[str, ...]]:
+        """By sampled controller, lines with what it holds after an instant: see `components.sampling`."""
+        graph = self.form.graph
         for part in graph.parts:
             if (sampler := part.component.sampler()) is None:
                 continue
@@ -159,21 +150,20 @@ class SetFunctions:
             x = [Symbol(f"{part.name}.x_{k + 1}", real=True) for k in range(len(sampler.A))]
             steps = {f"{part.name}.x_u_{k + 1}": row for k, row in enumerate(np.hstack((sampler.C, sampler.D)))}
             steps |= {symbol.name: row for symbol, row in zip(x, np.hstack((sampler.A, sampler.B)), strict=True)}
-            targets = ["const double period", *(f"after[{self.layout.states.index(name)}]" for name in steps)]
+            targets = [f"after[{self.layout.states.index(name)}]" for name in steps]
             sums = [
                 Add(*(float(gain) * one for gain, one in zip(row, [*x, *e], strict=True))) for row in steps.values()
             ]
-            lines += ["{", *self.assigned(targets[:1], [period]), "if (is_due(m->t, period)) {"]
-            lines += [*self.assigned(targets[1:], sums), "}", "}"]
-        return self._function("samples", lines)
+            due = self.assigned(["const double period"], [period])
+            yield ("{", *due, "if (is_due(m->t, period)) {", *self.assigned(targets, sums), "}", "}")
 
     def _measured(self, name: str) -> Expr:
         quantity = self.observables.quantity(name)
         return self.observables.store(name) if quantity is None else quantity
 
-    def _speeds_taken_up(self) -> Iterator[str]:
-        """(C + Q K F') x = C v + Q K (v_K - F_E' e)."""
-        form, n = self.form, len(self.form.across_states)
+    def _loads(self) -> Iterator[tuple[str, Expr]]:
+        """(C + Q K F') x = C v + Q K (v_K - F_E' e): the right-hand side."""
+        form = self.form
         right = {k: form.law_of(k) * self._stored(k) for k in form.across_states}
         for link in form.dependent_across:
             row = form.tree.loops[link]
@@ -181,11 +171,7 @@ class SetFunctions:
             prescribed = Add(*(gain * self.rows.across[tree] for tree, gain in pairs if tree in form.across_inputs))
             for tree, share in self._row(form.tree.cutsets, link):
                 right[tree] += share * form.law_of(link) * (self._stored(link) - prescribed)
-        yield f"double mass[{n * n}] = {{0.0}}, right[{n}];"
-        yield f"masses_{self.number}(m, t, stored, mass);"
-        yield from self._block([f"right[{k}]" for k in range(n)], [*right.values()])
-        yield f"solve({n}, mass, 1, right);"
-        yield from (f"x[{place}] = right[{k}];" for k, place in enumerate(self.places[form.speeds]))
+        yield from ((f"right[{k}]", momentum) for k, momentum in enumerate(right.values()))
 
     def _torques_taken_up(self) -> Iterator[str]:
         """(1 / L + F' Q / S) x = i / L - F' (i_S + Q_SW w) / S."""
@@ -225,35 +211,89 @@ class SetFunctions:
         return stored_symbol(store_name(self.form.graph, self.form.graph.branches[branch]))
 
 
-def functions_of_sets(name: str, sets: Sequence[Mapping[str, Expr]], statements: Statements) -> Iterator[str]:
-    """A function of each set of equations, and the one that calls that of the set of an instance.
+def function_of_sets(name: str, sets: Sequence[Mapping[str, Expr]], statements: Statements) -> str:
+    """The function of all sets of equations: each row and each term once, in a block for the sets that need it.
 
-    Rows that half of the sets or more have in common stand in one function that theirs call. Rows of fewer sets stay
-    with the others of their set: what they have in common with those, such as a sine, is then evaluated once.
+    A term is read in sets that need it alone: blocks of more sets come first.
 
     Args:
-        name: of the functions, as in `c_texts.ARGUMENTS`.
+        name: of the function, as in `c_texts.ARGUMENTS`.
         sets: what each of them assigns, target to expression.
         statements: writes expressions.
     """
-    call = ", ".join(("m", "t", *ARGUMENTS[name]))
-    sharers: dict[tuple[str, Expr], list[int]] = {}
+    rows: dict[tuple[str, Expr], int] = {}  # to the sets that need it, as bits of a number
     for number, one in enumerate(sets):
         for row in one.items():
-            sharers.setdefault(row, []).append(number)
-    groups: dict[tuple[int, ...], dict[str, Expr]] = {}
-    for (target, expression), numbers in sharers.items():
-        together = [tuple(numbers)] if 2 * len(numbers) >= len(sets) else [(number,) for number in numbers]
-        for sharing in together:
-            groups.setdefault(sharing, {})[target] = expression
-    lines: dict[str, list[str]] = {f"_{number}": [] for number in range(len(sets))}
-    for k, (sharing, rows) in enumerate(groups.items()):
-        suffix = f"_shared_{k}" if len(sharing) > 1 else f"_{sharing[0]}"
-        for number in sharing if len(sharing) > 1 else ():
-            lines[f"_{number}"].append(f"{name}{suffix}({call});")
-        lines.setdefault(suffix, []).extend(statements.assigned([*rows], [*rows.values()]))
-    yield from (function(signature(name, suffix), text) for suffix, text in reversed(lines.items()))
-    yield dispatcher(name, len(sets))
+            rows[row] = rows.get(row, 0) | 1 << number
+    code = statements.code_of([expression for _, expression in rows])
+    lines = [(target, value, need) for ((target, _), need), value in zip(rows.items(), code.values, strict=True)]
+    needs = dict.fromkeys((*code.systems, *code.terms), 0)
+    for _, value, need in lines:
+        needs |= {term: needs[term] | need for term in TERM.findall(value)}
+    for reader, value in reversed(code.terms.items()):
+        needs |= {term: needs[term] | needs[reader] for term in TERM.findall(value)}
+    for reader, text in reversed(code.systems.items()):  # which have terms of their own
+        needs |= {term: needs[term] | needs[reader] for term in TERM.findall("".join(text)) if term in code.systems}
+    lines = [*((term, value, needs[term]) for term, value in code.terms.items()), *lines]
+    always = (1 << len(sets)) - 1
+    reads = ((term, need) for _, value, need in lines for term in TERM.findall(value) if term in code.terms)
+    crossing = dict.fromkeys(term for term, need in reads if needs[term] not in (need, always))
+    together: dict[int, list[str]] = {}
+    for target, value, need in lines:
+        head = "const double " if target in needs and target not in crossing else ""
+        together.setdefault(need, []).append(f"{head}{target} = {value};")
+    blocks: list[tuple[int, Sequence[str]]] = []
+    for vector, (declaration, *solved) in code.systems.items():
+        blocks += [(always, [declaration]), (needs[vector], solved)]
+    blocks.append((always, [f"double {term} = 0.0;" for term in crossing]))
+    return _in_blocks(name, blocks + sorted(together.items(), key=lambda block: -block[0].bit_count()), len(sets))
+
+
+def _in_blocks(name: str, blocks: Sequence[tuple[int, Sequence[str]]], count: int) -> str:
+    """A function of blocks, of which each stands beside the sets that need it, all or some, as bits of a number."""
+    some = [*dict.fromkeys(need for need, _ in blocks if need != (1 << count) - 1)]
+    size, table = 32, f"BLOCKS_OF_{name.upper()}"  # bits of a number
+    words = -(-len(some) // size)
+    lines = [f"const uint32_t *const needs = {table} + {words} * m->set;"] if some else []
+    for need, block in blocks:
+        if need in some:
+            word, bit = divmod(some.index(need), size)
+            lines += [f"if ((needs[{word}] >> {bit} & 1u) != 0u) {{", *(f"    {line}" for line in block), "}"]
+        else:
+            lines += block
+    text = function(signature(name), lines)
+    if not some:
+        return text
+    members = [sum((need >> number & 1) << k for k, need in enumerate(some)) for number in range(count)]
+    bits = [f"0x{member >> size * word & (1 << size) - 1:x}u" for member in members for word in range(words)]
+    comment = f"/* Of each set of equations the blocks of `{name}` that it needs, as bits. */\n"
+    return f"{comment}{array('const uint32_t', table, bits)}\n{text}"
+
+
+def take_up_of_sets(sets: Sequence[SetFunctions]) -> str:
+    """The function `take_up` of all sets of equations."""
+    solved, taken = dict[tuple[str, ...], int](), dict[str, int]()
+    for number, one in enumerate(sets):
+        solved[one.solved()] = solved.get(one.solved(), 0) | 1 << number
+        for line in one.taken():
+            taken[line] = taken.get(line, 0) | 1 << number
+    always = (1 << len(sets)) - 1
+    blocks: list[tuple[int, Sequence[str]]] = [(need, lines) for lines, need in solved.items() if lines]
+    blocks += [
+        (need, [line for line, other in taken.items() if other == need]) for need in dict.fromkeys(taken.values())
+    ]
+    if any(one.ties for one in sets):
+        blocks.insert(0, (always, ["double mass[NX * NX] = {0.0}, right[NX] = {0.0};"]))
+    return _in_blocks("take_up", blocks, len(sets))
+
+
+def samples_of_sets(sets: Sequence[SetFunctions]) -> str:
+    """The function `samples` of all sets of equations."""
+    needs = dict[tuple[str, ...], int]()
+    for number, one in enumerate(sets):
+        for lines in one.samples():
+            needs[lines] = needs.get(lines, 0) | 1 << number
+    return _in_blocks("samples", [(need, lines) for lines, need in needs.items()], len(sets))
 
 
 def stored_symbol(name: str) -> Symbol:

@@ -10,10 +10,18 @@ from typing import TYPE_CHECKING, NamedTuple, cast
 from sympy import Symbol
 
 from shaftwork.ccode.c_printing import Statements, array
-from shaftwork.ccode.c_texts import dispatcher, filled, names_of, runtime
+from shaftwork.ccode.c_texts import filled, names_of, runtime
 from shaftwork.ccode.equation_set import EquationSet
 from shaftwork.ccode.instants import Instants
-from shaftwork.ccode.set_functions import LATER, ArrayLayout, SetFunctions, functions_of_sets, stored_symbol
+from shaftwork.ccode.set_functions import (
+    LATER,
+    ArrayLayout,
+    SetFunctions,
+    function_of_sets,
+    samples_of_sets,
+    stored_symbol,
+    take_up_of_sets,
+)
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.laws import t as TIME
 from shaftwork.core.errors import SignalError
@@ -143,14 +151,14 @@ class CodeWriter:
     def _source(self) -> str:
         modes, statements = self.modes, Statements(self._names, self._model.name)
         states, outputs = (tuple(v.name for v in some) for some in (self.states, self.outputs))
-        layout = ArrayLayout(states, self.stores, outputs, modes is not None, statements)
-        functions = [SetFunctions(number, one, layout) for number, one in enumerate(self.sets)]
+        layout = ArrayLayout(states, self.stores, outputs, statements)
+        functions = [SetFunctions(one, layout) for one in self.sets]
         still = [symbol for symbol, code in self._names.items() if code.startswith(("m->p", "m->u"))]
-        body = list[str]()
-        for name in functions[0].assignments:
-            body += functions_of_sets(name, [one.assignments[name] for one in functions], statements)
-        body += [one.text for one in functions]
-        body += [dispatcher(name, len(functions)) for name in ("take_up", "samples")]
+        tied = any(one.ties for one in functions)
+        called = {"loads": tied, "masses": tied or modes is not None}  # impacts need the inertias as well
+        names = [name for name in functions[0].assignments if called.get(name, True)]
+        body = [function_of_sets(name, [one.assignments[name] for one in functions], statements) for name in names]
+        body += [take_up_of_sets(functions), samples_of_sets(functions)]
         body += modes.texts(functions, statements) if modes else [runtime("no_modes.c")]
         body.append(Instants(self._model.form.graph, still).text(statements))
         text = "\n".join([*(text for _, text in statements.matrices.values()), *body])

@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from sympy import ITE, And, Basic, Expr, Float, Integer, Or, Piecewise, Pow, S, Symbol
+from sympy import ITE, And, Basic, Expr, Float, Integer, Mul, Or, Piecewise, Pow, S, Symbol
 from sympy.printing.numpy import NumPyPrinter
 from sympy.printing.pycode import PythonCodePrinter
 
@@ -329,10 +329,17 @@ def executed(source: str, name: str, names: dict[str, Any], namespace: dict[str,
     return function
 
 
-def shared_parts(printer: Any, expressions: Sequence[Expr]) -> dict[str, str]:
-    """The code of what stands in expressions more than once, by the names that the printer knows from here on."""
+def shared_parts(printer: Any, expressions: Sequence[Expr], *, scaled: bool = True) -> dict[str, str]:
+    """The code of what stands in expressions more than once, by the names that the printer knows from here on.
+
+    Args:
+        printer: of the expressions.
+        expressions: all of them.
+        scaled: whether multiples of a symbol count, which compiled code has at once.
+    """
     codes = {}
-    for number, shared in enumerate(_repeated(expressions)):
+    repeated = _repeated(expressions)
+    for number, shared in enumerate(repeated if scaled else [one for one in repeated if not _is_scaled(one)]):
         codes[f"s{number}"] = printer.doprint(shared)
         printer.names[shared] = f"s{number}"
     return codes
@@ -355,6 +362,10 @@ def _repeated(expressions: Sequence[Expr]) -> list[Basic]:
         count(expression)
     # a reciprocal is printed as a division
     return [n for n, uses in times.items() if uses > 1 and isinstance(n, Expr) and not _is_reciprocal(n)]
+
+
+def _is_scaled(node: Basic) -> bool:
+    return isinstance(node, Mul) and len(node.args) == 2 and node.args[0].is_number and node.args[1].is_Symbol
 
 
 def _is_reciprocal(node: Basic) -> bool:

@@ -64,7 +64,11 @@ class FMU:
             if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
                 raise ParameterError(f"FMU '{self.path.name}': start['{name}'] = {value!r} must be a finite number.")
         for name, what in ((self.speed, "speed"), (self.torque, "torque")):
-            self._variable(name, ("input", "output"), what)
+            if self._variable(name, ("input", "output"), what).variability == "discrete":
+                raise ParameterError(
+                    f"FMU '{self.path.name}': {what} names '{name}', which changes at events alone, and a part of a "
+                    "network has none. Name a continuous variable."
+                )
             self.scale(what)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -264,6 +268,11 @@ class _Instance:
         self._set, self._get = getattr(self._unit, f"set{kind}"), getattr(self._unit, f"get{kind}")
         self._rates = getattr(self._unit, rates)
         self._size = len(description.derivatives)
+        if newer and (count := self._unit.getNumberOfContinuousStates()) != self._size:
+            raise SimulationError(
+                f"The binary of the FMU '{fmu.path.name}' has {count} continuous states, but its modelDescription.xml "
+                f"tells {self._size}. They are not of the same export: make the FMU anew."
+            )
         if not newer:
             self._unit.setupExperiment(startTime=0.0)
         start = [[references[name]] for name in fmu.start], list(fmu.start.values())
