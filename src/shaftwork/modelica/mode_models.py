@@ -208,13 +208,13 @@ class _FreewheelModel(_ModeModel):
 
 
 class _SwitchModel(_ModeModel):
-    """A switch, with the small resistance and leakage of the library's ideal ones."""
+    """A switch, with the small resistance and leakage of diodes."""
 
     def constitute(self) -> None:
         closed = self.law(self.by_time(self.modes["closed"].starts), "voltage")
         self.variables += [
-            'parameter Real Ron(unit = "Ohm") = 1e-5 "Resistance while closed";',
-            'parameter Real Goff(unit = "S") = 1e-5 "Conductance while open";',
+            'parameter Real Ron(unit = "Ohm") = 1e-6 "Resistance while closed";',
+            'parameter Real Goff(unit = "S") = 1e-8 "Conductance while open";',
             f'Real voltage(unit = "{ELECTRICAL.across.unit}");',
             f'Real current(unit = "{ELECTRICAL.through.unit}");',
             "Boolean closed;",
