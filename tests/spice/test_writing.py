@@ -108,6 +108,14 @@ SWITCHING = {
         loaded(MOTOR, (sw.Backlash("gap", gap=0.02, c=400.0, d=1.0), "b", "c"), (sw.Inertia("Jc", J=1.0), "c")),
         LAWS,
     ),
+    "gear that rubs": (
+        loaded(
+            (sw.LossyGear("gear", ratio=-2.5, efficiency=0.8, efficiency_back=0.6), "b", "c"),
+            (sw.Inertia("Jc", J=1.0), "c"),
+            (sw.TorqueSource("kick", tau=15 * sympy.sin(9 * sw.t)), "a"),
+        ),
+        LAWS,
+    ),
     "stop": (loaded(MOTOR, (sw.HardStop("stop", upper=0.5, c=4000.0, d=5.0), "b", "ground")), 1e-3),
     "inertia that changes": (loaded(MOTOR, (sw.Inertia("crank", J=2 + sympy.cos(sw.phi)), "b")), 1e-4),
     "waves": (line(), 2e-3),  # ngspice interpolates the history of a line along straight lines
@@ -225,7 +233,7 @@ def test_a_coupling_that_says_what_others_say_is_left_out() -> None:
 
 def test_all_parts_without_a_form_in_spice_are_named_together() -> None:
     net = loaded((sw.Backlash("rigid", gap=0.1), "b", "c"), (sw.Inertia("Jc", J=1.0), "c"), MOTOR)
-    net.add(sw.LossyGear("rubs", ratio=2.0, efficiency=0.9), "c", "d")
+    net.add(sw.LossyGear("rubs", ratio=2.0, efficiency=0.4, efficiency_back=0.0), "c", "d")
     net.add(sw.Inertia("Jd", J=1.0), "d")
     with pytest.raises(sw.NetworkError) as caught:
         net.to_spice()

@@ -135,8 +135,8 @@ class _FrictionModel(_ModeModel):
             ),
             *(f"most_{side} = {self.law(self._limit(side), 'speed')};" for side in ("forward", "backward")),
             *(
-                f"start_{side} = pre(mode) == 0 and (pre(stuck) and s {past} most_{side} or pre(start_{side}) and s {past} "
-                f"slip_{side})\n  or (initial() or pre(mode) == 2) and speed {past} 0;"
+                f"start_{side} = (initial() or pre(mode) == 2) and speed {past} 0 or pre(mode) == 0\n  and "
+                f"(pre(stuck) and s {past} most_{side} or pre(start_{side}) and s {past} slip_{side});"
                 for side, past in (("forward", ">"), ("backward", "<"))
             ),
         ]
