@@ -1,7 +1,7 @@
 """Parts that change their mode, as one law each: SPICE knows no modes, and its laws should be smooth.
 
 What rubs has the sign of its speed as a hyperbolic tangent: it creeps where it should stick. Diodes, freewheels and
-switches are conductances, large while they conduct. Contacts that spring have the law of all their modes, exactly.
+switches are conductances, large while they conduct. Contacts that spring have the law of all their modes.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from sympy.core.relational import Relational
 from shaftwork.components.branches import ACROSS, THROUGH
 from shaftwork.components.controlled import VoltageControlledSwitch
 from shaftwork.components.friction import SLIPPING, STUCK
-from shaftwork.components.laws import t
+from shaftwork.components.laws import larger, smaller, t
 from shaftwork.components.mechanics import LossyGear
 from shaftwork.components.modes import Modes, mode_symbol
 from shaftwork.network.graph import CircuitGraph, GraphBranch, GraphPart
@@ -64,7 +64,7 @@ def smoothed(part: GraphPart, graph: CircuitGraph) -> SmoothedPart:
             notes.append(CREEPS)
         elif machine.law is not None:
             (branch,) = moded
-            laws[branch.index] = machine.law
+            laws[branch.index] = _touching(machine.law) if getattr(part.component, "d", 0) else machine.law
         elif _rubs(machine):
             laws |= _rubbing(machine, moded)
             notes.append(CREEPS)
@@ -77,6 +77,13 @@ def smoothed(part: GraphPart, graph: CircuitGraph) -> SmoothedPart:
             names = ", ".join(dict.fromkeys(mode.words for mode in machine.options))
             raise NoSpiceFormError(f"it changes between the modes {names}, which no law of SPICE stands for", INSTEAD)
     return SmoothedPart(laws, tuple(added), tuple(notes))
+
+
+def _touching(contact: Expr) -> Expr:
+    """A law of flanks whose damping sets in over a small depth: at a jump of torque ngspice may find no step."""
+    depth = SMOOTH / 1000
+    pieces = ((push, beyond.gts - beyond.lts) for push, beyond in contact.args if beyond != sympy.true)
+    return sympy.Add(*(push * larger(0, smaller(1, beyond / depth)) for push, beyond in pieces))
 
 
 def _meshing(gear: LossyGear) -> Expr:

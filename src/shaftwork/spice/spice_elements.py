@@ -129,7 +129,8 @@ class Elements:
 
     def _of_branch(self, branch: GraphBranch, law: Expr | None) -> Iterator[str]:
         template = branch.template
-        law = self._in_numbers(template.law if law is None else law, self._parameters(self._part(branch)))
+        symbols, numbers = template.law if law is None else law, self._parameters(self._part(branch))
+        law = self._in_numbers(symbols, numbers)
         if law == 0 and template.kind is not Kind.ACROSS_SOURCE and not branch.terms:
             return
         label, plus, minus = self._element(branch), self.node(branch.plus), self.node(branch.minus)
@@ -142,11 +143,11 @@ class Elements:
             case Kind.ACROSS_STORE:
                 yield f"C{label} {plus} {minus} {float(law)!r}{condition}"
             case Kind.THROUGH_STORE:
-                yield f"L{label} {plus} {minus} {1 / float(law)!r}{condition}"
+                yield f"L{label} {plus} {minus} {float(self._in_numbers(1 / symbols, numbers))!r}{condition}"
             case Kind.CONDUCTANCE if template.line is not None:
                 yield self._line(branch)
             case Kind.CONDUCTANCE:
-                yield f"R{label} {plus} {minus} {1 / float(law)!r}"
+                yield f"R{label} {plus} {minus} {float(self._in_numbers(1 / symbols, numbers))!r}"
             case Kind.ACROSS_SOURCE:
                 yield self._source("V", branch, law, plus, minus)
             case Kind.THROUGH_SOURCE | Kind.LAW:
