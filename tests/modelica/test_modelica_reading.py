@@ -68,6 +68,13 @@ def test_files_of_the_library_move_as_another_tool_has_them(name: str) -> None:
         assert motion[quantity][-1] == pytest.approx(value, rel=OF_RUMOCA, abs=1e-6)
 
 
+def test_a_vehicle_runs_up_to_the_speed_at_which_the_wind_takes_all_force() -> None:
+    """From 0.1 s on 2 kg are pushed by 10 N, less 10 N at the square of v / 5 m/s."""
+    t = np.linspace(0.0, 5.0, 51)
+    motion = sw.read_modelica(FILES / "RollingWheel.mo").simulate(t_eval=t)
+    np.testing.assert_allclose(motion["mass.v"], 5 * np.tanh(np.maximum(0.0, t - 0.1)), rtol=1e-8, atol=1e-9)
+
+
 def test_parameters_start_values_and_the_end_are_read() -> None:
     model = sw.read_modelica(TRAIN)
     assert [placed.part for placed in model.network.netlist().placed] == [

@@ -200,6 +200,25 @@ X1 in out rc c=2u
 """,
         1e-5,
     ),
+    "instances whose values read names of the subcircuit": (
+        """scopes
+.param c=9u r=500
+.subckt rc a b r=1k c=1u
+.param q=3u
+R1 a b {r}
+C1 b 0 {c+q}
+.ends
+.subckt two a b c=2u
+X1 a b rc c={c} r={2*r+c*1e6}
+.ends
+V1 in 0 SIN(0 1 50)
+X1 in out rc r={c*1e9} q=1u
+X2 out far rc r={r} c={q}
+X3 far end two
+.tran 1m 60m
+""",
+        1e-4,
+    ),
     "laws of time and of the own voltage": (
         """laws
 .param smooth=0.1
@@ -374,7 +393,7 @@ T1 1 2 3 0 Z0=50 TD=1n
         ("title\n.param f(x)=2\nR1 1 0 1\n", "line 2"),
         ("title\n.subckt a 1\nR1 1 0 1\n.ends\n.subckt A 1\nR1 1 0 2\n.ends\n", "line 2 defines this subcircuit, too"),
         ("title\nR1 1 0 1\n.model m d()\n.model M d(n=2)\n", "line 3 has this model, too"),
-        ("title\nR1 1 0 {p}\n.param p={q}\n.param q={p}\n", "1 names have no value: p; 'p' stands in line 4"),
+        ("title\nR1 1 0 {p}\n.param p={q}\n.param q={p}\n", "parameters p, q read each other"),
         ("title\nB1 1 0 V=2*v(2)\nR1 1 0 1\n", "of the voltage across the source"),
         ("title\nB1 1 0 5\nR1 1 0 1\n", "V=expression or I=expression"),
         ("title\nR1 1 0 {x}\n", "1 names have no value: x"),

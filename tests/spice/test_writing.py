@@ -88,6 +88,7 @@ SWITCHING = {
     "pendulum": (loaded((sw.TorqueSource("weight", tau=30 - 60 * sympy.sin(sw.phi)), "a")), LAWS),
     "motor": (loaded((sw.KlossMotor("motor", tau_k=30.0, n_sync=250.0, s_k=0.3), "a")), LAWS),
     "jumps": (loaded((sw.TorqueSource("jumps", tau=sw.Step(20, 0.3) * sympy.sin(9 * sw.t)), "a")), LAWS),
+    "pulses": (loaded((sw.TorqueSource("pulses", tau=20 * sw.PWM(0.3, 37.0)), "a")), 3e-5),
     "noise": (
         loaded((sw.TorqueSource("noise", tau=5 + 3 * sw.HeldNoise(sw.t / 0.05, 1) + sw.SmoothNoise(sw.t, 2)), "a")),
         1e-4,  # smooth noise is a table, which is off by 1e-3 of its standard deviation
@@ -106,6 +107,14 @@ SWITCHING = {
     ),
     "gap": (
         loaded(MOTOR, (sw.Backlash("gap", gap=0.02, c=400.0, d=1.0), "b", "c"), (sw.Inertia("Jc", J=1.0), "c")),
+        LAWS,
+    ),
+    "gear that rubs": (
+        loaded(
+            (sw.LossyGear("gear", ratio=-2.5, efficiency=0.8, efficiency_back=0.6), "b", "c"),
+            (sw.Inertia("Jc", J=1.0), "c"),
+            (sw.TorqueSource("kick", tau=15 * sympy.sin(9 * sw.t)), "a"),
+        ),
         LAWS,
     ),
     "stop": (loaded(MOTOR, (sw.HardStop("stop", upper=0.5, c=4000.0, d=5.0), "b", "ground")), 1e-3),
@@ -178,7 +187,7 @@ def test_the_text_names_parts_nodes_values_and_units() -> None:
         "Lshaft out wheel 5e-05",
         "Rshaft_d out wheel 0.07142857142857142",
         "Bload wheel 0 I = 22.4*tanh(v(wheel)/{smooth})",
-        ".tran 0.003 6.0 0 0.003 uic",
+        ".tran 0.00075 6.0 0 0.00075 uic",
     ):
         assert line in lines
     assert max(map(len, lines)) <= 110
@@ -201,9 +210,10 @@ def test_names_that_spice_takes_for_one_get_numbers() -> None:
     [
         (3.0, "-3.0"),
         (2 + 3 * sympy.sin(10 * sw.t), "SIN(-2.0 -3.0 1.5915494309189535 0 0 0.0)"),
-        (sw.Step(5.0, 0.25), "PWL(0.0 0.0 0.2499995 0.0 0.25 -5.0 1.0 -5.0)"),
+        (sw.Step(5.0, 0.25), "PWL(0.0 0.0 0.249999875 0.0 0.25 -5.0 1.0 -5.0)"),
         (sw.Ramp(5.0, 0.5), "PWL(0.0 0.0 0.5 -5.0 1.0 -5.0)"),
         (sympy.exp(-sw.t), "-exp(-time)"),
+        (4 * sw.PWM(0.25, 10.0), "PULSE(-4.0 0.0 0.0124999375 1.25e-07 1.25e-07 0.07500000000000001 0.1)"),
         (sw.omega**3, "-(v(a)*v(a)*v(a))"),  # the powers of ngspice are those of the size of their base
         (sympy.sqrt(sympy.Abs(sw.omega)), "-sqrt(abs(v(a)))"),
         (sw.Table([0, 1], [2, 3])(sw.omega), "-pwl(max(0.0, min(1.0, v(a))), 0.0, 2.0, 1.0, 3.0)"),
@@ -225,7 +235,7 @@ def test_a_coupling_that_says_what_others_say_is_left_out() -> None:
 
 def test_all_parts_without_a_form_in_spice_are_named_together() -> None:
     net = loaded((sw.Backlash("rigid", gap=0.1), "b", "c"), (sw.Inertia("Jc", J=1.0), "c"), MOTOR)
-    net.add(sw.LossyGear("rubs", ratio=2.0, efficiency=0.9), "c", "d")
+    net.add(sw.LossyGear("rubs", ratio=2.0, efficiency=0.4, efficiency_back=0.0), "c", "d")
     net.add(sw.Inertia("Jd", J=1.0), "d")
     with pytest.raises(sw.NetworkError) as caught:
         net.to_spice()

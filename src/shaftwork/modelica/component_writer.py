@@ -38,6 +38,7 @@ def component_text(form: StateForm, *, inline: bool, t_end: float, start: Mappin
     text = "\n".join(
         [
             f"package {package} {quoted(form.graph.name)}",
+            "  // Written by Shaftwork, in SI units: parts joined by connect, then the models that the library has not",
             "",
             f"  model Network {quoted(form.graph.name)}",
             *(f"    {line}" for line in lines),
@@ -49,7 +50,7 @@ def component_text(form: StateForm, *, inline: bool, t_end: float, start: Mappin
         ]
     )
     models = [*work.models.values()]
-    models.append(functions_in("".join(models)))
+    models += [functions] if (functions := functions_in("".join(models))) else []
     models += [files(__package__).joinpath(LIBRARY).read_text(encoding="utf-8")] if inline else []
     return "\n".join([text, *models, f"end {package};", ""])
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from sympy import Expr, Symbol
 
@@ -81,7 +82,8 @@ def flat_text(form: StateForm, start: Mapping[str, float], t_end: float, turned:
         ) from None
     lines = list(_Flat(form, rows, start, turned).lines(t_end))
     name = Identifiers()[graph.name]
-    text = "\n".join([f"model {name} {quoted(graph.name)}", *lines, f"end {name};", ""])
+    head = "  // Written by Shaftwork, in SI units: parameters, states, quantities; then the rates of the states"
+    text = "\n".join([f"model {name} {quoted(graph.name)}", head, *lines, f"end {name};", ""])
     return text.replace("\n", f"\n{functions_in(text)}", 1)
 
 
@@ -102,6 +104,7 @@ class _Flat:
         """Declarations, equations and the experiment."""
         shown = dict(self._quantities())
         names = {name: self._names.unused(name) for name in shown}  # a parameter may have the same one
+        shown = self._with_names(shown, names)
         yield from map(self._parameter, self._parameters)
         for state in self._form.states:
             start = number(self._start.get(state.name, 0.0))
@@ -130,6 +133,23 @@ class _Flat:
         for k, side in enumerate(system.right):
             row = (entry * system.unknowns[j] for (i, j), entry in system.matrix.items() if i == k)
             yield f"  {' + '.join(map(self._printer.doprint, row))} = {self._printer.doprint(side)};"
+
+    def _with_names(self, shown: dict[str, Expr], names: Mapping[str, str]) -> dict[str, Expr]:
+        """The quantities, and the rates in place, with the names of quantities where their laws would stand again."""
+        laws = {
+            expression: Symbol(names[name])
+            for name, expression in shown.items()
+            if expression.args and (-expression).args and not (expression.is_Add or expression.is_number)
+        }
+        self._printer.names |= {symbol: symbol.name for symbol in laws.values()}
+        laws = {-expression: -symbol for expression, symbol in laws.items()} | laws
+        self._rows = replace(self._rows, rates=tuple(rate.xreplace(laws) for rate in self._rows.rates))
+        return {
+            name: expression.func(*(arg.xreplace({**laws, -expression: -expression}) for arg in expression.args))
+            if laws.get(expression) == Symbol(names[name])
+            else expression.xreplace(laws)
+            for name, expression in shown.items()
+        }
 
     def _parameter(self, name: str) -> str:
         owner, _, parameter = name.rpartition(".")

@@ -266,13 +266,13 @@
             extends Interfaces.OnePort;
             parameter Real Ron(unit = "Ohm") = 1e-5;
             parameter Real Goff(unit = "S") = 1e-5;
-            Boolean off(start = true) "Whether it blocks";
+            Boolean off(start = true, fixed = true) "Whether it blocks";
           protected
             Real s(start = 0) "Voltage where it blocks, current where it conducts";
           equation
-            off = s < 0;
-            v = s * (if off then 1 else Ron);
-            i = s * (if off then Goff else 1);
+            off = if pre(off) then s < 1e-9 else s < -1e-9 "Rounding in a bridge does not switch it to and fro";
+            v = s * (if pre(off) then 1 else Ron);
+            i = s * (if pre(off) then Goff else 1);
           end IdealDiode;
         end Ideal;
 

@@ -134,13 +134,14 @@ class _FrictionModel(_ModeModel):
                 for side in ("forward", "backward")
             ),
             *(f"most_{side} = {self.law(self._limit(side), 'speed')};" for side in ("forward", "backward")),
-            "start_forward = pre(mode) == 0 and (s > most_forward or pre(start_forward) and s > slip_forward)",
-            "  or initial() and speed > 0;",
-            "start_backward = pre(mode) == 0 and (s < most_backward or pre(start_backward) and s < slip_backward)",
-            "  or initial() and speed < 0;",
+            *(
+                f"start_{side} = (initial() or pre(mode) == 2) and speed {past} 0 or pre(mode) == 0\n  and "
+                f"(pre(stuck) and s {past} most_{side} or pre(start_{side}) and s {past} slip_{side});"
+                for side, past in (("forward", ">"), ("backward", "<"))
+            ),
         ]
         moving = "pre(mode) == 1 or start_forward or pre(mode) == -1 or start_backward"
-        forward, backward = "start_forward or pre(mode) == 1 and not start_backward", "slip_backward"
+        ahead = "start_forward or pre(mode) == 1 and not start_backward"
         if active == true:
             self.equations += [f"stuck = not ({moving});"]
             free, rest, ended = "", "", ""
@@ -148,12 +149,11 @@ class _FrictionModel(_ModeModel):
             self.variables.append("Boolean on;")
             self.equations += [f"on = {on};", f"stuck = on and not ({moving});"]
             free, rest, ended = f"if not on then {off} else ", "if not on then s else ", "if not on then 2 else "
-        again = " or pre(mode) == 2" if ended else ""
         self.equations += [
-            f"through = if stuck then s else {free}if {forward} then slip_forward else {backward};",
-            f"acceleration = if stuck then 0 else {rest}s - (if {forward} then slip_forward else {backward});",
-            f"mode = {ended}if (pre(mode) == 1{again} or start_forward) and speed > 0 then 1",
-            f"  else if (pre(mode) == -1{again} or start_backward) and speed < 0 then -1 else 0;",
+            f"through = if stuck then s else {free}if {ahead} then slip_forward else slip_backward;",
+            f"acceleration = if stuck then 0 else {rest}s - (if {ahead} then most_forward else most_backward);",
+            f"mode = {ended}if (pre(mode) == 1 or start_forward) and speed > 0 then 1",
+            "  else if (pre(mode) == -1 or start_backward) and speed < 0 then -1 else 0;",
         ]
         self.give("through")
 
@@ -208,13 +208,13 @@ class _FreewheelModel(_ModeModel):
 
 
 class _SwitchModel(_ModeModel):
-    """A switch, with the small resistance and leakage of the library's ideal ones."""
+    """A switch, with the small resistance and leakage of diodes."""
 
     def constitute(self) -> None:
         closed = self.law(self.by_time(self.modes["closed"].starts), "voltage")
         self.variables += [
-            'parameter Real Ron(unit = "Ohm") = 1e-5 "Resistance while closed";',
-            'parameter Real Goff(unit = "S") = 1e-5 "Conductance while open";',
+            'parameter Real Ron(unit = "Ohm") = 1e-6 "Resistance while closed";',
+            'parameter Real Goff(unit = "S") = 1e-8 "Conductance while open";',
             f'Real voltage(unit = "{ELECTRICAL.across.unit}");',
             f'Real current(unit = "{ELECTRICAL.through.unit}");',
             "Boolean closed;",

@@ -171,13 +171,13 @@ class PartModel:
             Kind.THROUGH_STORE: f"der({through}) = {law} * {across};",
             Kind.CONDUCTANCE: f"{through} = {law} * {across};",
             Kind.ACROSS_SOURCE: f"{across} = {law};",
-        }.get(branch.template.kind, f"{through} = {law};")
+        }.get(branch.template.kind, f"{through} = {law[1:-1] if law.startswith('(') else law};")
         self.equations += [f"for k in 1:{size} loop", f"  {line}", "end for;"] if index else [line]
 
     def _coupling(self, branch: GraphBranch) -> str:
         printer = ModelicaPrinter(self.symbols, self.title)
         terms = (
-            f"({printer.doprint(factor)}) * {difference((self.places.get(plus), self.places.get(minus)))}"
+            f"{_times(printer.doprint(factor))}{difference((self.places.get(plus), self.places.get(minus)))}"
             for factor, plus, minus in branch.template.terms
         )
         return f"0 = {' + '.join(terms)};"
@@ -244,7 +244,7 @@ class PartModel:
         printer = ModelicaPrinter(self.symbols, self.title)
         for branch in (branch for group in groups for branch in group.branches):
             for factor, plus, minus in branch.template.balances or ((None, *branch.template.ends),):
-                scale = "" if factor is None else f"({printer.doprint(factor)}) * "
+                scale = "" if factor is None else _times(printer.doprint(factor))
                 for end, sign in ((plus, ""), (minus, "-")):
                     if end is not None:
                         flows[end].append((f"{sign}{scale}", throughs[branch.index]))
@@ -269,3 +269,8 @@ class PartModel:
                 continue
             self.declare(self._signals[name], measure)
             self.equations.append(f"{self._signals[name]} = {sign}{value};")
+
+
+def _times(factor: str) -> str:
+    """A factor in front of what it multiplies."""
+    return "" if factor == "1" else f"({factor}) * "

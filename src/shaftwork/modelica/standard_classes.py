@@ -84,7 +84,8 @@ _CLASSES: dict[str, StandardClass] = {
         {"n": "ratio", "considerMagnetization": lambda _: False},
         {name: name for name in ("p1", "n1", "p2", "n2")},
     ),
-    "Diode": StandardClass(f"{ANALOG}.Ideal.IdealDiode", {}, _PINS),
+    # with the 1e-5 of the library a circuit of some ohms is off by 1e-4
+    "Diode": StandardClass(f"{ANALOG}.Ideal.IdealDiode", {"Ron": lambda _: 1e-6, "Goff": lambda _: 1e-8}, _PINS),
     "VoltageSource": StandardClass(f"{ANALOG}.Sources.ConstantVoltage", {"V": "u"}, _PINS),
     # a current source of the library takes its current in at p, one of ours gives it
     "CurrentSource": StandardClass(f"{ANALOG}.Sources.ConstantCurrent", {"I": "i"}, {"p": "n", "n": "p"}),

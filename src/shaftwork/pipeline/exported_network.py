@@ -85,7 +85,7 @@ class ExportedNetwork(NetworkBuilder):
         Args:
             path: a file to which the text is written, "crane.cir"; by default none.
             t_end: end of the motion, s.
-            step: longest step of ngspice, s; by default a 2000th of the motion.
+            step: longest step of ngspice, s; by default an 8000th of the motion.
             initial: start values, as for `Model.simulate`.
 
         Raises:

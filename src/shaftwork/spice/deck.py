@@ -18,8 +18,8 @@ from shaftwork.spice.smoothed_modes import SmoothedPart, smoothed
 from shaftwork.spice.spice_elements import Elements
 from shaftwork.spice.spice_laws import NoSpiceFormError
 
-STEPS = 2000
-"""Steps of a run where no step is given: 20 for each period of 100 of them."""
+STEPS = 8000
+"""Steps of a run where no step is given: 80 for each period of 100 of them, which turns each by 5e-4 of itself."""
 EDGE = 1e-3
 """Share of a step in which a jump rises; ngspice takes corners apart that are 5e-5 of a step from each other."""
 SMOOTH = 1e-4

@@ -55,17 +55,19 @@ class Scope:
 
     Args:
         outer: that of the circuit around it.
-        texts: by name the line that says a parameter, its text, and in which scope that is read.
+        texts: by name the line that says a parameter, and its text.
         numbers: what has been read of them so far, and what was given as numbers.
+        reading: names that are being read, each for the one before it.
     """
 
     outer: Scope | None = None
-    texts: dict[str, tuple[NetlistLine, str, Scope]] = field(default_factory=dict)
+    texts: dict[str, tuple[NetlistLine, str]] = field(default_factory=dict)
     numbers: dict[str, Any] = field(default_factory=dict)
+    reading: list[str] = field(default_factory=list)
 
-    def add(self, line: NetlistLine, pairs: Mapping[str, str], read_in: Scope) -> None:
+    def add(self, line: NetlistLine, pairs: Mapping[str, str]) -> None:
         """Take in the parameters of a line; a later one of a name wins, as in ngspice, but not over a number."""
-        self.texts.update({name: (line, text, read_in) for name, text in pairs.items() if name not in self.numbers})
+        self.texts.update({name: (line, text) for name, text in pairs.items() if name not in self.numbers})
 
 
 @dataclass(frozen=True)
@@ -270,10 +272,10 @@ def _expanded(
         prefix = f"{line.prefix}{line.words[0]}."
         outside = {**everywhere, **dict(zip(definition.nodes, map(line.node, nodes), strict=True))}
         scope = Scope(outer)
-        scope.add(definition.line, definition.values, scope)
-        scope.add(line, line.pairs(start), outer)
+        scope.add(definition.line, definition.values)
         for one in (one for one in definition.lines if one.command == ".param"):
-            scope.add(one, one.parameters(), scope)
+            scope.add(one, one.parameters())
+        scope.add(line, line.pairs(start))  # read inside too, as in ngspice
         circuit = (one for one in definition.lines if one.command != ".param")
         inner = [NetlistLine(one.number, one.text, one.words, prefix, outside, scope) for one in circuit]
         yield from _expanded(inner, definitions, everywhere, scope, depth + 1)

@@ -207,7 +207,7 @@ class _NetlistReader:
             self._faults.append(line.error("its parameters read others, and these others, more than 100 deep"))
 
     def _parameter(self, line: NetlistLine) -> None:
-        self._values.parameters.add(line, line.parameters(), self._values.parameters)
+        self._values.parameters.add(line, line.parameters())
 
     def _command(self, line: NetlistLine) -> None:
         command = line.command[1:]

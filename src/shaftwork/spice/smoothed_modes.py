@@ -1,7 +1,7 @@
 """Parts that change their mode, as one law each: SPICE knows no modes, and its laws should be smooth.
 
 What rubs has the sign of its speed as a hyperbolic tangent: it creeps where it should stick. Diodes, freewheels and
-switches are conductances, large while they conduct. Contacts that spring have the law of all their modes, exactly.
+switches are conductances, large while they conduct. Contacts that spring have the law of all their modes.
 """
 
 from __future__ import annotations
@@ -16,15 +16,16 @@ from sympy.core.relational import Relational
 from shaftwork.components.branches import ACROSS, THROUGH
 from shaftwork.components.controlled import VoltageControlledSwitch
 from shaftwork.components.friction import SLIPPING, STUCK
-from shaftwork.components.laws import t
+from shaftwork.components.laws import larger, smaller, t
+from shaftwork.components.mechanics import LossyGear
 from shaftwork.components.modes import Modes, mode_symbol
 from shaftwork.network.graph import CircuitGraph, GraphBranch, GraphPart
-from shaftwork.network.kinds import Kind
 from shaftwork.spice.spice_laws import NoSpiceFormError
 
 SMOOTH, CONDUCTING, BLOCKING = (Symbol(f"{{{name}}}") for name in ("smooth", "g_on", "g_off"))
 """Parameters of a deck: speed over which a friction changes its sign, conductances of what conducts and blocks."""
 
+CREEPS = "sticking is creeping: sign(speed) is tanh(speed / smooth)"
 INSTEAD = (
     "Take a part with smooth laws: a contact with a stiffness c, a brake that is on from t_on, an AveragedBLDC, whose "
     "laws are the means of a BLDCMotor over its commutations."
@@ -36,7 +37,8 @@ class SmoothedPart:
     """What stands for the modes of a part.
 
     Args:
-        laws: by branch the law in place of its own, in ACROSS, INTEGRAL, the time and parameters of the part.
+        laws: by branch the law in place of its own, in ACROSS, INTEGRAL, the time and parameters of the part; of a mesh
+            the torque of its second shaft, in ACROSS and THROUGH of its first one.
         added: laws of further branches, and their ends.
         notes: what is smoothed, for the comment of the part.
     """
@@ -57,12 +59,15 @@ def smoothed(part: GraphPart, graph: CircuitGraph) -> SmoothedPart:
     notes: list[str] = []
     for machine in () if isinstance(part.component, VoltageControlledSwitch) else part.modes:  # that is an S element
         moded = [graph.branches[k] for k in part.branches if mode_symbol(machine.symbol) in _symbols(graph.branches[k])]
-        if machine.law is not None:
+        if isinstance(part.component, LossyGear):
+            laws[part.branches[0]] = _meshing(part.component)
+            notes.append(CREEPS)
+        elif machine.law is not None:
             (branch,) = moded
-            laws[branch.index] = machine.law
+            laws[branch.index] = _touching(machine.law) if getattr(part.component, "d", 0) else machine.law
         elif _rubs(machine):
             laws |= _rubbing(machine, moded)
-            notes.append("sticking is creeping: sign(speed) is tanh(speed / smooth)")
+            notes.append(CREEPS)
         elif (closed := _closing(machine)) is not None:
             plus, minus = (part.node_at(end) for end in part.ends_of(machine))
             added.append((closed, plus, minus))
@@ -72,6 +77,24 @@ def smoothed(part: GraphPart, graph: CircuitGraph) -> SmoothedPart:
             names = ", ".join(dict.fromkeys(mode.words for mode in machine.options))
             raise NoSpiceFormError(f"it changes between the modes {names}, which no law of SPICE stands for", INSTEAD)
     return SmoothedPart(laws, tuple(added), tuple(notes))
+
+
+def _touching(contact: Expr) -> Expr:
+    """A law of flanks whose damping sets in over a small depth: at a jump of torque ngspice may find no step."""
+    depth = SMOOTH / 1000
+    pieces = ((push, beyond.gts - beyond.lts) for push, beyond in contact.args if beyond != sympy.true)
+    return sympy.Add(*(push * larger(0, smaller(1, beyond / depth)) for push, beyond in pieces))
+
+
+def _meshing(gear: LossyGear) -> Expr:
+    """The torque into shaft b: that of shaft a times the ratio, less the share that friction takes of its size."""
+    ratio, drives, driven = (Symbol(name, real=True) for name in ("ratio", "efficiency", "efficiency_back"))
+    if gear.efficiency_back is None:
+        driven = drives
+    elif gear.efficiency_back <= 0:
+        raise NoSpiceFormError("it locks itself, which no law of SPICE stands for", "Take an efficiency_back above 0.")
+    mean, half = (drives + 1 / driven) / 2, (drives - 1 / driven) / 2
+    return -ratio * (mean * THROUGH + half * sympy.Abs(THROUGH) * tanh(ACROSS / SMOOTH))
 
 
 def _symbols(branch: GraphBranch) -> frozenset[Symbol]:
@@ -109,9 +132,6 @@ def _rubbing(machine: Modes, branches: list[GraphBranch]) -> dict[int, Expr]:
     laws: dict[int, Expr] = {}
     for branch in branches:
         law = branch.template.law
-        if branch.template.kind is Kind.COUPLING:
-            why = "the ratio of its coupling depends on its mode, which no law of SPICE stands for"
-            raise NoSpiceFormError(why, "Take a Gear, and a Damper or CoulombLoad for what it loses.")
         if all(law.subs(mode, value) == 0 for value in (1, -1, 0)):  # it carries an angle alone
             laws[branch.index] = sympy.S.Zero
             continue

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 
 from sympy import Expr, Float, Symbol
 
-from shaftwork.components.branches import ACROSS, INTEGRAL
+from shaftwork.components.branches import ACROSS, INTEGRAL, THROUGH
 from shaftwork.components.controlled import VoltageControlledSwitch
 from shaftwork.components.discontinuities import breakpoints
 from shaftwork.components.laws import replaced, t
@@ -129,7 +129,8 @@ class Elements:
 
     def _of_branch(self, branch: GraphBranch, law: Expr | None) -> Iterator[str]:
         template = branch.template
-        law = self._in_numbers(template.law if law is None else law, self._parameters(self._part(branch)))
+        symbols, numbers = template.law if law is None else law, self._parameters(self._part(branch))
+        law = self._in_numbers(symbols, numbers)
         if law == 0 and template.kind is not Kind.ACROSS_SOURCE and not branch.terms:
             return
         label, plus, minus = self._element(branch), self.node(branch.plus), self.node(branch.minus)
@@ -142,11 +143,11 @@ class Elements:
             case Kind.ACROSS_STORE:
                 yield f"C{label} {plus} {minus} {float(law)!r}{condition}"
             case Kind.THROUGH_STORE:
-                yield f"L{label} {plus} {minus} {1 / float(law)!r}{condition}"
+                yield f"L{label} {plus} {minus} {float(self._in_numbers(1 / symbols, numbers))!r}{condition}"
             case Kind.CONDUCTANCE if template.line is not None:
                 yield self._line(branch)
             case Kind.CONDUCTANCE:
-                yield f"R{label} {plus} {minus} {1 / float(law)!r}"
+                yield f"R{label} {plus} {minus} {float(self._in_numbers(1 / symbols, numbers))!r}"
             case Kind.ACROSS_SOURCE:
                 yield self._source("V", branch, law, plus, minus)
             case Kind.THROUGH_SOURCE | Kind.LAW:
@@ -154,7 +155,7 @@ class Elements:
             case Kind.COUPLING if branch.index in self._redundant:
                 yield "* (left out: other couplings say the same)"
             case Kind.COUPLING:
-                yield from self._coupling(branch)
+                yield from self._coupling(branch, law)
 
     def _source(self, kind: str, branch: GraphBranch, law: Expr, plus: str, minus: str) -> str:
         label, law = self._element(branch), self._of_time(law)
@@ -163,7 +164,7 @@ class Elements:
         reads = self._readings(branch)
         return f"B{label} {plus} {minus} {kind} = {self._printed(law, branch.plus, branch.minus, reads, branch.index)}"
 
-    def _coupling(self, branch: GraphBranch) -> Iterator[str]:
+    def _coupling(self, branch: GraphBranch, law: Expr) -> Iterator[str]:
         """Sources in series, whose voltages are those of the other terms, and sources of current in those."""
         label, numbers = self._element(branch), self._parameters(self._part(branch))
         across = [(float(self._in_numbers(c, numbers)), plus, minus) for c, plus, minus in branch.terms]
@@ -179,7 +180,11 @@ class Elements:
             far, count = end if k == len(others) - 1 else inner[k + 1], "" if len(others) == 1 else f"_{k + 1}"
             ends = f"{self.node(other)} {self.node(back)}"
             yield f"E{label}{count} {inner[k]} {far} {ends} {-factor / first!r}"
-            yield f"F{label}{count} {ends} V{label} {through[k + 1] / through[0]!r}"
+            if law.has(THROUGH):  # of teeth that rub the ratio of torques depends on who drives
+                text = self._printed(law, plus, minus, {THROUGH: Symbol(f"i(V{label})")})
+                yield f"B{label}{count} {ends} I = {text}"
+            else:
+                yield f"F{label}{count} {ends} V{label} {through[k + 1] / through[0]!r}"
 
     def _line(self, branch: GraphBranch) -> str:
         of_line = self._of_line(branch)

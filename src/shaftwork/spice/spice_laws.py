@@ -95,8 +95,10 @@ class _SpicePrinter(StrPrinter):  # type: ignore[misc]
         return text
 
     def _print_Heaviside(self, step: Any) -> str:
-        argument = self._print(step.args[0])
-        return f"(({argument} > 0) ? 1 : ({argument} < 0) ? 0 : {self._print(step.args[1])})"
+        argument, at_zero = map(self._print, step.args)
+        if step.args[1] in (0, 1):
+            return f"(({argument} {'>' if step.args[1] == 0 else '>='} 0) ? 1 : 0)"
+        return f"(({argument} > 0) ? 1 : ({argument} < 0) ? 0 : {at_zero})"
 
     def _print_sign(self, sign: Any) -> str:
         return f"sgn({self._print(sign.args[0])})"
@@ -245,8 +247,8 @@ def waveform(law: Expr, t_end: float, edge: float) -> str | None:
         return repr(float(law))
     if law.free_symbols != {t}:
         return None
-    if (sine := _sine(law)) is not None:
-        return sine
+    if (wave := _sine(law) or _pulses(law, edge)) is not None:
+        return wave
     if pieces_degree(law) is None or law.has(sympy.floor):
         return None
     points = [*_corners(law, t_end, edge)]
@@ -268,6 +270,22 @@ def _sine(law: Expr) -> str | None:
     if frequency < 0:  # the frequency of a SIN is a size
         return _sine(offset + amplitude * sympy.sin(pi - argument.as_expr())) if isinstance(wave, sympy.sin) else None
     return f"SIN({float(offset)!r} {float(amplitude)!r} {frequency!r} 0 0 {degrees!r})"
+
+
+def _pulses(law: Expr, edge: float) -> str | None:
+    """PULSE(high low delay rise fall width period) of low + (high - low) Heaviside(cos(2 pi f t) - level)."""
+    low, wave = law.as_independent(t, as_Add=True)
+    height, wave = wave.as_independent(t, as_Add=False)
+    if not isinstance(wave, sympy.Heaviside):
+        return None
+    level, cosine = wave.args[0].as_independent(t, as_Add=True)
+    if not isinstance(cosine, sympy.cos) or not abs(level) < 1 or not (rate := cosine.args[0] / t).is_number:
+        return None
+    period = float(2 * pi / rate)
+    on = float(sympy.acos(-level) / pi)  # share of a period
+    low, high = float(low), float(low + height)
+    edge = min(edge, on * period / 2, (1 - on) * period / 2)
+    return f"PULSE({high!r} {low!r} {(on * period - edge) / 2!r} {edge!r} {edge!r} {(1 - on) * period!r} {period!r})"
 
 
 def _corners(law: Expr, t_end: float, edge: float) -> Iterator[tuple[float, float]]:

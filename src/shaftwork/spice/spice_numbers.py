@@ -81,11 +81,21 @@ class NetlistValues:
             LineError: its text is no number.
         """
         inner = scope or self.parameters
-        while name not in {**inner.numbers, **inner.texts} and inner.outer is not None:
+        # a parameter that reads its own name means that of the circuit around
+        while inner.outer is not None and (
+            name not in {**inner.numbers, **inner.texts} or inner.reading[-1:] == [name]
+        ):
             inner = inner.outer
-        if name in inner.texts:  # while it is read it is not there: one that reads itself has no value
-            said, text, read_in = inner.texts.pop(name)
-            inner.numbers[name] = self._constant(said, text, read_in)
+        if name in inner.reading[:-1]:
+            names = ", ".join(inner.reading)
+            raise line.error(f"its parameters {names} read each other. Write one of them as a number")
+        if name in inner.texts and name not in {*inner.numbers, *inner.reading}:
+            said, text = inner.texts[name]
+            inner.reading.append(name)
+            try:
+                inner.numbers[name] = self._constant(said, text, inner)
+            finally:
+                inner.reading.pop()
         if name not in inner.numbers:
             self.missing.setdefault(name, line)
         return inner.numbers.get(name, sympy.Float(1.0))

@@ -21,7 +21,7 @@ from shaftwork.components.electrical import (
     VoltageSource,
 )
 from shaftwork.components.friction import Brake, Clutch, DryFriction
-from shaftwork.components.laws import Ramp, Step, omega, phi
+from shaftwork.components.laws import Ramp, Step, omega, phi, v
 from shaftwork.components.laws import t as TIME
 from shaftwork.components.mechanics import (
     Damper,
@@ -99,14 +99,18 @@ def _sign(torque: Callable[[Mapping[str, Any]], Any]) -> Any:
     return make
 
 
-def _linear(values: Mapping[str, Any]) -> Any:
-    share = omega / values["w_nominal"]
-    return values["tau_nominal"] * (sympy.Abs(share) if values["TorqueDirection"] else share)
+def _follows_speed(part: Any, speed: Any, words: tuple[str, str, str], power: int) -> ReadClass:
+    """A torque or force that is the nominal one times a power of the speed over the nominal one."""
+    through, across, direction = words
 
+    def make(name: str, values: Mapping[str, Any]) -> Parts:
+        share = speed / values[f"{across}_nominal"]
+        same = values[f"{direction}Direction"]  # in both directions of motion
+        shape = sympy.Abs(share) ** power if same else share * sympy.Abs(share) ** (power - 1)
+        yield part(name, **{through: values[f"{through}_nominal"] * shape}), ("flange",)
 
-def _quadratic(values: Mapping[str, Any]) -> Any:
-    share = omega / values["w_nominal"]
-    return values["tau_nominal"] * (share**2 if values["TorqueDirection"] else share * sympy.Abs(share))
+    names = {f"{through}_nominal": REQUIRED, f"{across}_nominal": REQUIRED, f"{direction}Direction": True}
+    return ReadClass(("flange",), names, make, support=True)
 
 
 def _backlash(name: str, values: Mapping[str, Any]) -> Parts:
@@ -243,7 +247,6 @@ SIGNALS: Mapping[str, tuple[Mapping[str, Any], Callable[[Mapping[str, Any]], Any
 
 _FRICTION = {"mue_pos": [[0.0, 0.5]], "peak": 1.0, "cgeo": 1.0, "fn_max": REQUIRED, "f_normalized": REQUIRED}
 _GAP = {"c": REQUIRED, "d": 0.0, "b": 0.0, "phi_rel0": 0.0}
-_NOMINAL = {"tau_nominal": REQUIRED, "w_nominal": REQUIRED, "TorqueDirection": True}
 _HALVES = {"flange_a": ("L", -0.5), "flange_b": ("L", 0.5)}
 
 
@@ -300,8 +303,9 @@ def _rotational() -> Iterator[tuple[str, ReadClass]]:
     yield "Sources.ConstantSpeed", ReadClass(flange, {"w_fixed": REQUIRED}, speed, support=True)
     speeds = {"exact": False, "w_ref": REQUIRED}
     yield "Sources.Speed", ReadClass(flange, speeds, _exact_speed, signal="w_ref", support=True)
-    yield "Sources.LinearSpeedDependentTorque", ReadClass(flange, _NOMINAL, _sign(_linear), support=True)
-    yield "Sources.QuadraticSpeedDependentTorque", ReadClass(flange, _NOMINAL, _sign(_quadratic), support=True)
+    for power, word in enumerate(("Linear", "Quadratic"), 1):
+        law = _follows_speed(TorqueSource, omega, ("tau", "w", "Torque"), power)
+        yield f"Sources.{word}SpeedDependentTorque", law
 
 
 def _translational() -> Iterator[tuple[str, ReadClass]]:
@@ -323,6 +327,8 @@ def _translational() -> Iterator[tuple[str, ReadClass]]:
     yield "Sources.Force", ReadClass(flange, {"f": REQUIRED}, force, signal="f", support=True)
     force = _one(ForceSource, FLANGES[::-1], f="f")
     yield "Sources.Force2", ReadClass(FLANGES, {"f": REQUIRED}, force, signal="f")
+    for power, word in enumerate(("Linear", "Quadratic"), 1):
+        yield f"Sources.{word}SpeedDependentForce", _follows_speed(ForceSource, v, ("f", "v", "Force"), power)
 
 
 def _sensors() -> Iterator[tuple[str, ReadClass]]:
