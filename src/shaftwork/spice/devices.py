@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from sympy import exp
@@ -38,7 +38,7 @@ THERMAL = 1.380649e-23 * 300.15 / 1.602176634e-19
 """Thermal voltage in V at 27 degrees Celsius, at which SPICE takes its diodes."""
 LARGEST_EXPONENT = 80.0
 """Up to here a diode is exponential: 1e-14 A times e^80 is beyond any current."""
-DEAD_WITHOUT_CAPACITY = ("vj", "m", "fc", "eg", "xti", "tnom", "level")
+DEAD_WITHOUT_CAPACITY = ("vj", "m", "fc", "eg", "xti", "tnom")
 """Parameters of diodes that change nothing at 27 degrees Celsius where there is no capacity."""
 _LAW = re.compile(r"\S+\s+\S+\s+\S+\s+([vi])\s*=\s*(.+)", re.IGNORECASE)
 _READING = re.compile(r"\b([vi])\s*\(([^()]*)\)", re.IGNORECASE)
@@ -69,6 +69,7 @@ class Devices:
     initial: dict[str, float] = field(default_factory=dict)
     inductors: dict[str, tuple[NetlistLine, float, tuple[str, str]]] = field(default_factory=dict)
     meters: dict[str, list[tuple[str, str]]] = field(default_factory=dict)
+    swings: list[tuple[str, float, complex]] = field(default_factory=list)
 
     def add(self, line: NetlistLine) -> None:
         """Add what a line is.
@@ -185,6 +186,7 @@ class Devices:
             self.place(CurrentSource(name, i=-law), p, n)
 
     def _controlled(self, line: NetlistLine, name: str) -> None:
+        line = replace(line, words=tuple(word for word in line.words if word not in "()"))
         if len(line.words) != 6 or line.words[3].lower().startswith(("poly", "value", "vol", "cur", "table")):
             raise line.error("it has four nodes and a gain; other forms, as POLY and VALUE, are not read")
         gain = self.values.number(line, line.words[5])
@@ -238,7 +240,8 @@ class Devices:
             raise line.error(f".model {name} is of type '{other}', not '{kind}'")
         unread = DEAD_WITHOUT_CAPACITY if kind == "d" and "cjo" not in pairs and "cj0" not in pairs else ()
         read = {key: self.values.number(origin, text) for key, text in pairs.items() if key not in unread}
-        if strange := [key for key, value in read.items() if key not in defaults and value]:
+        standard = {"level": 1.0}
+        if strange := [key for key, value in read.items() if key not in defaults and value != standard.get(key, 0.0)]:
             names = ", ".join(defaults)
             raise origin.error(f"{', '.join(strange)} of a model of type {kind} is not read. Known: {names}")
         return {key: read.get(key, value) for key, value in defaults.items()}

@@ -271,7 +271,10 @@ def _expanded(
         outside = {**everywhere, **dict(zip(definition.nodes, map(line.node, nodes), strict=True))}
         scope = Scope(outer)
         scope.add(definition.line, definition.values, scope)
-        scope.add(line, line.pairs(start), outer)
+        pairs = line.pairs(start)
+        if "m" in pairs.keys() - definition.values.keys():
+            raise line.error("M puts several of a subcircuit in parallel, which is not read. Write them one by one")
+        scope.add(line, pairs, outer)
         for one in (one for one in definition.lines if one.command == ".param"):
             scope.add(one, one.parameters(), scope)
         circuit = (one for one in definition.lines if one.command != ".param")
