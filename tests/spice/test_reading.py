@@ -381,6 +381,7 @@ T1 1 2 3 0 Z0=50 TD=1n
         ("title\nR1 1 0 {x}\n", "1 names have no value: x"),
         ("title\nR1 1 0 {1/0}\n", "cannot be read"),
         ("title\nR1 1 0 1e999\n", "line 2"),
+        ("title\nL1 1 0 -1m\nR1 1 0 1\n", "line 2 'L1 1 0 -1m': L = -0.001 must be at least 0"),
         ("title\nV1 1 0 SIN(0)\n", "SIN has 1 values"),
         ("title\nV1 1 0 PWL(0 1 2)\n", "PWL takes pairs"),
         ("title\nC1 1 0 1u IC=1\n.ic v(1)=2\nR1 1 0 1\n.tran 1u 1m\n", "without uic"),

@@ -29,6 +29,8 @@ from shaftwork.components.electrical import (
     VoltageSource,
 )
 from shaftwork.components.laws import smaller, u
+from shaftwork.core.errors import ParameterError
+from shaftwork.network.graph import resolve
 from shaftwork.network.netlist import REFERENCE, Placed, first_few
 from shaftwork.spice.netlist_lines import ENDS, NetlistLine
 from shaftwork.spice.source_waveforms import source_law
@@ -101,7 +103,13 @@ class Devices:
         makers[kind](line, f"{line.prefix}{line.words[0]}")
 
     def place(self, part: Component, *nodes: str) -> None:
-        """Add a part between nodes of the netlist."""
+        """Add a part between nodes of the netlist.
+
+        Raises:
+            ParameterError: a value is out of its bounds.
+        """
+        for name, value, objection in resolve(part)[1]:
+            raise ParameterError(f"{name} = {value} {objection}")
         self.placed.append(Placed(part, tuple(REFERENCE if node == "0" else node for node in nodes)))
 
     def _ends(self, line: NetlistLine, count: int = 2) -> tuple[str, ...]:
