@@ -386,6 +386,10 @@ T1 1 2 3 0 Z0=50 TD=1n
         ("title\nV1 1 0 PWL(0 1 2)\n", "PWL takes pairs"),
         ("title\nC1 1 0 1u IC=1\n.ic v(1)=2\nR1 1 0 1\n.tran 1u 1m\n", "without uic"),
         ("title\n.tran 1\nR1 1 0 1\n", "written .tran step end"),
+        (
+            "title\nC1 1 0 1u IC=5\nT1 1 0 2 0 Z0=50 TD=1u\nR1 2 0 1\n.tran 1n 1u uic\n",
+            "line 5 '.tran 1n 1u uic': it begins with charged capacitors",
+        ),
         ("title\nS1 1 0 1 0 sm ON\n.model sm sw()\n", "is not read"),
     ],
 )

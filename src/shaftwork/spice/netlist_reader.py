@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from shaftwork.components.controlled import (
+    TransmissionLine,
     VoltageControlledCurrentSource,
     VoltageControlledSwitch,
     VoltageControlledVoltageSource,
@@ -187,6 +188,13 @@ class _NetlistReader:
         if self._start_voltages and not begins:
             self._faults.append(
                 self._start_voltages[0][0].error("without uic in .tran it holds a node, which is not read")
+            )
+        charged = any(name.endswith(".u") and value for name, value in initial.items())
+        if self._uic and charged and any(isinstance(item.part, TransmissionLine) for item in devices.placed):
+            self._faults.append(
+                self._uic.error(
+                    "it begins with charged capacitors and lines without charge, which is not read together"
+                )
             )
         self._refuse()
         if not devices.placed:
