@@ -74,6 +74,12 @@ def test_a_motion_under_a_curve_from_a_file_is_that_under_its_points(logged: Pat
         ("0,1\n1,\n2,3\n", {}, r"line 2: column 1 holds no number"),
         ("0,1\n1,1_000\n", {}, r"line 2: column 1 holds no number"),
         ("0,1\n1,inf\n", {}, r"line 2: column 1 holds inf"),
+        (
+            "t,x,x\n0,1,2\n1,2,3\n",
+            {"x": "t", "y": "x"},
+            r"no line with numbers .*Name columns by their head or their num",
+        ),
+        ("0;1,5\n1;1.500\n", {"delimiter": ";", "decimal": ","}, r"line 2: column 1 holds no number"),
         ("2026-03-01T12:00,1\n7,2\n", {}, r"line 2: '7\.0' and .* are not of one kind"),
         ("2026-03-01T12:00,1\n2026-03-01T12:00:01Z,2\n", {}, r"line 2: .* time stamps with a time zone, or without"),
         ("2026-03-01T12:00,1\n2026-03-01T11:00,2\n", {}, r"line 2: column 0 must increase"),

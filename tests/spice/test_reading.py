@@ -7,7 +7,6 @@ from random import Random
 
 import numpy as np
 import pytest
-import sympy
 from hypothesis import HealthCheck, given, settings
 
 import shaftwork as sw
@@ -384,6 +383,8 @@ T1 1 2 3 0 Z0=50 TD=1n
         ("title\nX1 1 0 unknown\n", "there is no subcircuit 'unknown'"),
         ("title\n.subckt a 1\nR1 1 0 1\n", "the subcircuit does not end"),
         ("title\n.ends\n", "no subcircuit begins before it"),
+        ("title\nX1 1 0 a m=5\n.subckt a 1 2\nR1 1 2 1\n.ends\n", "line 2 'X1 1 0 a m=5': M puts several"),
+        ("title\nD1 1 0 d\nR1 1 0 1\n.model d d(level=200)\n", "level of a model of type d is not read"),
         ("title\n.subckt a 1 2\nX1 1 2 a\n.ends\nX1 1 0 a\n", "inside each other more than 20 times"),
         ("title\nF1 1 0 V9 2\nR1 1 0 1\n", "no voltage source 'V9'"),
         ("title\nL1 1 0 1\nR1 1 0 1\nK1 L1 L2 0.5\n", "two inductors"),
@@ -399,10 +400,15 @@ T1 1 2 3 0 Z0=50 TD=1n
         ("title\nR1 1 0 {x}\n", "1 names have no value: x"),
         ("title\nR1 1 0 {1/0}\n", "cannot be read"),
         ("title\nR1 1 0 1e999\n", "line 2"),
+        ("title\nL1 1 0 -1m\nR1 1 0 1\n", "line 2 'L1 1 0 -1m': L = -0.001 must be at least 0"),
         ("title\nV1 1 0 SIN(0)\n", "SIN has 1 values"),
         ("title\nV1 1 0 PWL(0 1 2)\n", "PWL takes pairs"),
         ("title\nC1 1 0 1u IC=1\n.ic v(1)=2\nR1 1 0 1\n.tran 1u 1m\n", "without uic"),
         ("title\n.tran 1\nR1 1 0 1\n", "written .tran step end"),
+        (
+            "title\nC1 1 0 1u IC=5\nT1 1 0 2 0 Z0=50 TD=1u\nR1 2 0 1\n.tran 1n 1u uic\n",
+            "line 5 '.tran 1n 1u uic': it begins with charged capacitors",
+        ),
         ("title\nS1 1 0 1 0 sm ON\n.model sm sw()\n", "is not read"),
     ],
 )
@@ -488,8 +494,27 @@ def test_lcapy_start_values_make_a_motion_from_rest() -> None:
 
 def test_lcapy_laws_may_be_expressions_of_time() -> None:
     circuit = sw.spice.read("V1 1 0 {3*sin(2*t)*u(t)}; down\nR1 1 0 1; down\nTF1 2 0 1 0 4; right\nR2 2 0 1; down\n")
-    assert circuit.network.parts[0].u == 3 * sympy.sin(2 * sw.t) * sympy.Heaviside(sw.t)
     np.testing.assert_allclose(circuit.simulate(1.0)["2.u"][-1], 12 * np.sin(2.0), rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("source", "start", "of_lcapy"),
+    [
+        ("ac 3 0.4 2", 1.14832985063, [1.16063279656, -1.23643254864]),
+        ("{3*cos(2*t) + 5*u(t) + 1}", 1.47435897436, [3.84271966412, 2.59869985105]),
+        ("{exp(-t)}", 0.0, [0.28560218730, 0.16761102317]),
+        ("dc 3", 2.0, [2.0, 2.0]),
+    ],
+)
+def test_what_swings_in_lcapy_has_always_swung_and_all_else_begins_at_zero(
+    source: str, start: float, of_lcapy: list[float]
+) -> None:
+    """The motion of lcapy 1.26, which superposes direct voltages, steady waves and what begins at time zero."""
+    circuit = sw.spice.read(
+        f"V1 1 0 {source}; down\nR1 1 2 1; right\nC1 2 0 1; down\nL1 2 3 0.5; right\nR2 3 0 2; down\n"
+    )
+    motion = circuit.simulate(2.0, t_eval=[0.0, 0.5, 2.0], rtol=1e-10)
+    np.testing.assert_allclose(motion["2.u"], [start, *of_lcapy], rtol=1e-7, atol=1e-12)
 
 
 @pytest.mark.parametrize(

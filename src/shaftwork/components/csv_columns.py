@@ -25,7 +25,9 @@ _HEAD = re.compile(
 """A name and its unit: "omega [rpm]", "omega (rpm)" or "omega_rpm"."""
 _TOGETHER = re.compile(r"\b([kM]?N)m\b")
 _SPELLINGS = {"%": "percent", "°C": "degC", "°": "degree", "°/s": "degree/s"} | dict.fromkeys(("U/min", "r/min"), "rpm")
-_NOT_SI = re.compile(r"[mnuµμkM](?:s|A|V|W|N|J|m|bar|N[ *·]?m)|min|h|rpm|[1Ur]/min|deg(?:ree)?|°|deg/s|°/s|km/h|bar|%")
+_NOT_SI = re.compile(
+    r"[mnuµμkM](?:s|A|V|W|N|J|m|bar|N[ *·]?m)|min|h|rpm|[1Ur]/min|deg(?:ree)?|°[CF]?|deg/s|°/s|km/h|bar|%"
+)
 """Units in which numbers are another quantity than in SI."""
 Value = float | datetime
 
@@ -189,11 +191,11 @@ def _rows(lines: Iterable[str], delimiter: str) -> Iterator[tuple[int, list[str]
 
 
 def _places_in(head: Sequence[str], columns: tuple[str | int, str | int]) -> tuple[int, int] | None:
-    """Numbers of the columns where a head has all names, whole or but for their unit; else None."""
+    """Numbers of the columns where a head has all names once, whole or but for their unit; else None."""
     bare = [match["name"] if (match := _HEAD.fullmatch(cell)) else cell for cell in head]
     places = []
     for column in columns:
-        names = next((names for names in (head, bare) if column in names), None)
+        names = next((names for names in (head, bare) if names.count(column) == 1), None)
         if names is None and isinstance(column, str):
             return None
         places.append(column if isinstance(column, int) else list(names or ()).index(column))
@@ -203,7 +205,8 @@ def _places_in(head: Sequence[str], columns: tuple[str | int, str | int]) -> tup
 def _number(text: str, decimal: str) -> float | None:
     """The number that a text is, or None."""
     try:
-        return None if "_" in text else float(text.replace(decimal, "."))
+        foreign = "_" in text or (decimal != "." and "." in text)  # 1.500 is 1500 where decimals stand behind a comma
+        return None if foreign else float(text.replace(decimal, "."))
     except ValueError:
         return None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from sympy import exp
@@ -29,6 +29,8 @@ from shaftwork.components.electrical import (
     VoltageSource,
 )
 from shaftwork.components.laws import smaller, u
+from shaftwork.core.errors import ParameterError
+from shaftwork.network.graph import resolve
 from shaftwork.network.netlist import REFERENCE, Placed, first_few
 from shaftwork.spice.netlist_lines import ENDS, NetlistLine
 from shaftwork.spice.source_waveforms import source_law
@@ -38,7 +40,7 @@ THERMAL = 1.380649e-23 * 300.15 / 1.602176634e-19
 """Thermal voltage in V at 27 degrees Celsius, at which SPICE takes its diodes."""
 LARGEST_EXPONENT = 80.0
 """Up to here a diode is exponential: 1e-14 A times e^80 is beyond any current."""
-DEAD_WITHOUT_CAPACITY = ("vj", "m", "fc", "eg", "xti", "tnom", "level")
+DEAD_WITHOUT_CAPACITY = ("vj", "m", "fc", "eg", "xti", "tnom")
 """Parameters of diodes that change nothing at 27 degrees Celsius where there is no capacity."""
 _LAW = re.compile(r"\S+\s+\S+\s+\S+\s+([vi])\s*=\s*(.+)", re.IGNORECASE)
 _READING = re.compile(r"\b([vi])\s*\(([^()]*)\)", re.IGNORECASE)
@@ -69,6 +71,7 @@ class Devices:
     initial: dict[str, float] = field(default_factory=dict)
     inductors: dict[str, tuple[NetlistLine, float, tuple[str, str]]] = field(default_factory=dict)
     meters: dict[str, list[tuple[str, str]]] = field(default_factory=dict)
+    swings: list[tuple[str, float, complex]] = field(default_factory=list)
 
     def add(self, line: NetlistLine) -> None:
         """Add what a line is.
@@ -100,7 +103,13 @@ class Devices:
         makers[kind](line, f"{line.prefix}{line.words[0]}")
 
     def place(self, part: Component, *nodes: str) -> None:
-        """Add a part between nodes of the netlist."""
+        """Add a part between nodes of the netlist.
+
+        Raises:
+            ParameterError: a value is out of its bounds.
+        """
+        for name, value, objection in resolve(part)[1]:
+            raise ParameterError(f"{name} = {value} {objection}")
         self.placed.append(Placed(part, tuple(REFERENCE if node == "0" else node for node in nodes)))
 
     def _ends(self, line: NetlistLine, count: int = 2) -> tuple[str, ...]:
@@ -185,6 +194,7 @@ class Devices:
             self.place(CurrentSource(name, i=-law), p, n)
 
     def _controlled(self, line: NetlistLine, name: str) -> None:
+        line = replace(line, words=tuple(word for word in line.words if word not in "()"))
         if len(line.words) != 6 or line.words[3].lower().startswith(("poly", "value", "vol", "cur", "table")):
             raise line.error("it has four nodes and a gain; other forms, as POLY and VALUE, are not read")
         gain = self.values.number(line, line.words[5])
@@ -238,7 +248,8 @@ class Devices:
             raise line.error(f".model {name} is of type '{other}', not '{kind}'")
         unread = DEAD_WITHOUT_CAPACITY if kind == "d" and "cjo" not in pairs and "cj0" not in pairs else ()
         read = {key: self.values.number(origin, text) for key, text in pairs.items() if key not in unread}
-        if strange := [key for key, value in read.items() if key not in defaults and value]:
+        standard = {"level": 1.0}
+        if strange := [key for key, value in read.items() if key not in defaults and value != standard.get(key, 0.0)]:
             names = ", ".join(defaults)
             raise origin.error(f"{', '.join(strange)} of a model of type {kind} is not read. Known: {names}")
         return {key: read.get(key, value) for key, value in defaults.items()}

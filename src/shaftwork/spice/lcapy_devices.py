@@ -120,7 +120,7 @@ class LcapyDevices(Devices):
                 return self._named(line, 3)
             case ["dc" | "step" as kind, *rest] if len(rest) < 2:
                 value = self.values.number(line, rest[0] if rest else line.words[0])
-                return value if kind == "dc" else Piecewise((0, t < 0), (value, True))
+                return value if kind == "dc" else value * sympy.Heaviside(t)
             case ["ac", *rest] if len(rest) < 4:
                 by_default = (line.words[0], "0", "omega_0")
                 amplitude, angle, speed = (self.values.number(line, word) for word in (*rest, *by_default[len(rest) :]))
@@ -129,11 +129,24 @@ class LcapyDevices(Devices):
                 return self.values.law(line, value)
         raise line.error("the source is not understood. Known are: a value, {an expression of t}, dc, step, ac")
 
+    def _since_zero(self, source: str, law: Any) -> Any:
+        """A law as lcapy takes it: what is constant or swings has always done so, all else begins at time zero."""
+        constant: Any = 0
+        for term in sympy.Add.make_args(sympy.expand_mul(law)):
+            factor, wave = term.as_independent(t, as_Add=False)
+            angle = wave.args[0] if isinstance(wave, sympy.cos | sympy.sin) else t**2
+            if wave == 1:
+                constant += factor
+            elif not (speed := angle.diff(t)).has(t):
+                phase = angle.subs(t, 0) - (sympy.pi / 2 if isinstance(wave, sympy.sin) else 0)
+                self.swings.append((source, float(speed), complex(factor * sympy.exp(sympy.I * phase))))
+        return law if law == constant else Piecewise((constant, t < 0), (law, True))
+
     def _voltage(self, line: NetlistLine, name: str) -> None:
-        self._metered(line, name, self._law(line))
+        self._metered(line, name, self._since_zero(f"{name}.u", self._law(line)))
 
     def _current(self, line: NetlistLine, name: str) -> None:
-        self.place(CurrentSource(name, i=self._law(line)), *self._ends(line))
+        self.place(CurrentSource(name, i=self._since_zero(f"{name}.i", self._law(line))), *self._ends(line))
 
     def _controlled(self, line: NetlistLine, name: str) -> None:
         kind, words = kind_of(name), [word for word in line.words if word != "opamp"]

@@ -273,9 +273,12 @@ def _expanded(
         outside = {**everywhere, **dict(zip(definition.nodes, map(line.node, nodes), strict=True))}
         scope = Scope(outer)
         scope.add(definition.line, definition.values)
+        pairs = line.pairs(start)
+        if "m" in pairs.keys() - definition.values.keys():
+            raise line.error("M puts several of a subcircuit in parallel, which is not read. Write them one by one")
         for one in (one for one in definition.lines if one.command == ".param"):
             scope.add(one, one.parameters())
-        scope.add(line, line.pairs(start))  # read inside too, as in ngspice
+        scope.add(line, pairs)  # read inside too, as in ngspice
         circuit = (one for one in definition.lines if one.command != ".param")
         inner = [NetlistLine(one.number, one.text, one.words, prefix, outside, scope) for one in circuit]
         yield from _expanded(inner, definitions, everywhere, scope, depth + 1)

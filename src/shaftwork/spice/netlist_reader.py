@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from shaftwork.components.controlled import (
+    TransmissionLine,
     VoltageControlledCurrentSource,
     VoltageControlledSwitch,
     VoltageControlledVoltageSource,
@@ -49,6 +51,8 @@ class SpiceCircuit:
             `uic`.
         t_end: end of the motion in s; None where the netlist has none.
         t_steady: time in s at which sources are read for that steady state.
+        swings: what has swung for ever before the start, as the "ac" of lcapy: the input, "V1.u", its angular frequency
+            in rad/s and its complex amplitude at time zero.
     """
 
     network: Network
@@ -56,6 +60,7 @@ class SpiceCircuit:
     from_rest: bool = False
     t_end: float | None = None
     t_steady: float = 0.0
+    swings: tuple[tuple[str, float, complex], ...] = ()
 
     def start(self, *, algebraic_loops: Literal["refuse", "solve"] = "refuse") -> dict[str, float]:
         """Start values for `Model.simulate`.
@@ -66,7 +71,17 @@ class SpiceCircuit:
         if self.from_rest:
             return dict(self.initial)
         model = self.network.compile(algebraic_loops=algebraic_loops)
-        return {**(model.steady_state(t=self.t_steady) if model.states or model.form.waves else {}), **self.initial}
+        if not (model.states or model.form.waves):
+            return dict(self.initial)
+        steady = model.steady_state(t=self.t_steady)
+        start = dict(steady)
+        if self.swings:
+            near = model.linearize(steady, t=self.t_steady)
+            for source, omega, amplitude in self.swings:
+                for name in near.states:
+                    response = near.frequency_response(source, name, abs(omega) / (2 * math.pi)).values[0]
+                    start[name] += (response * (amplitude if omega > 0 else amplitude.conjugate())).real
+        return {**start, **self.initial}
 
     def simulate(
         self, t_end: float | None = None, *, algebraic_loops: Literal["refuse", "solve"] = "refuse", **options: Any
@@ -174,6 +189,13 @@ class _NetlistReader:
             self._faults.append(
                 self._start_voltages[0][0].error("without uic in .tran it holds a node, which is not read")
             )
+        charged = any(name.endswith(".u") and value for name, value in initial.items())
+        if self._uic and charged and any(isinstance(item.part, TransmissionLine) for item in devices.placed):
+            self._faults.append(
+                self._uic.error(
+                    "it begins with charged capacitors and lines without charge, which is not read together"
+                )
+            )
         self._refuse()
         if not devices.placed:
             why = "A str is the text of a netlist; give a file as pathlib.Path(...)."
@@ -185,7 +207,7 @@ class _NetlistReader:
             network.add(item.part, *item.nodes)
         from_rest = self._uic is not None or (self._lcapy and bool(initial))
         t_steady = BEFORE if self._lcapy else 0.0
-        return SpiceCircuit(network, initial, from_rest, self._span[1] or None, t_steady)
+        return SpiceCircuit(network, initial, from_rest, self._span[1] or None, t_steady, tuple(devices.swings))
 
     def _kind(self, line: NetlistLine) -> str:
         return kind_of(line.words[0]) if self._lcapy else line.command[0].upper()
