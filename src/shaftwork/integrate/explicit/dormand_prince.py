@@ -134,10 +134,11 @@ class MachineSteps:
 
     Args:
         problem: the motion up to its next breakpoint.
+        machine: its right-hand side.
         at: goes on from there, in equal equations; by default from the start of the problem.
     """
 
-    def __init__(self, problem: Problem, at: MachineSnapshot | None = None) -> None:
+    def __init__(self, problem: Problem, machine: MachineRates, at: MachineSnapshot | None = None) -> None:
         guards = problem.guards
         if at is None:
             bound = bound_of_decay(jacobians(problem))
@@ -146,14 +147,14 @@ class MachineSteps:
             at = MachineSnapshot(problem.t0, problem.x0, pieces(problem)[0], 0.0, longest, offsets)
         elif guards is not None:
             problem = changed(problem, guards=replace(guards, offsets=np.asarray(at.offsets)))
-        self._problem, self.at = problem, at
+        self._problem, self._machine, self.at = _watching(problem, machine), machine, at
 
     def step(self, end: float) -> bool:
         """Go on to a time in s; False where something happens on the way, and nothing has been done."""
-        at, machine = self.at, self._problem.machine
-        if machine is None or end >= at.piece.end or end - at.t > MOST_SMOOTH * at.longest:
+        at = self.at
+        if end >= at.piece.end or end - at.t > MOST_SMOOTH * at.longest:
             return False
-        stepper = _MachineStepper(self._problem, machine, at.longest)
+        stepper = _MachineStepper(self._problem, self._machine, at.longest)
         stepper.resume(at, end)
         try:
             step = stepper.step(at.t, at.x)
@@ -164,14 +165,10 @@ class MachineSteps:
         self.at = at._replace(t=end, x=step.state, length=stepper.length)
         return True
 
-    def with_parameters(self, _p: Array, problem_with: Callable[[], Problem]) -> bool:
-        """Go on in the same equations with other parameters, those of a problem."""
-        problem, old = problem_with(), self._problem.guards
-        guards = problem.guards
-        if guards is not None and old is not None:
-            old = replace(old, values=guards.values)
-        values = {"rhs": problem.rhs, "machine": problem.machine, "switches": problem.switches, "guards": old}
-        self._problem, self.at = changed(self._problem, **values), self.at._replace(length=0.0)
+    def with_parameters(self, p: Array) -> bool:
+        """Go on in the same equations with other parameters (p,) of the model."""
+        self._machine = self._machine._replace(p=self._machine.values(p))
+        self._problem = _watching(self._problem, self._machine)
         return True
 
 

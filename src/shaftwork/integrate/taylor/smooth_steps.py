@@ -6,7 +6,6 @@ microseconds; what a whole run looks at before and after would take a hundred ti
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -96,7 +95,7 @@ class SmoothSteps:
         self.at = after
         return True
 
-    def with_parameters(self, p: Array, _problem_with: Callable[[], Problem]) -> bool:
+    def with_parameters(self, p: Array) -> bool:
         """Go on with other parameters (p,) of the model; False where that changes more than they, and nothing has."""
         program, at = self._program, self.at
         parameters, values = at.parameters.copy(), program.bind(p).parameters
