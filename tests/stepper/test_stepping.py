@@ -280,6 +280,20 @@ def test_steps_follow_travelling_waves() -> None:
     assert followed(run, wanted, "motor.tau") < 1e-9
 
 
+def test_what_waves_hold_is_told_after_setting_and_restoring() -> None:
+    """A wave is not in the states of an instant: its energy and power are those of the motion that goes on."""
+    shaft = sw.Shaft("shaft", length=10.0, diameter=0.1, model=sw.Wave())
+    run, names = two_masses(5.0, shaft=shaft).compile().start(), ("shaft.energy", "shaft.power", "shaft.tau_b")
+    run.step(0.01)
+    before = [run[name] for name in names if run.names]
+    state = run.save_state()
+    run.set("motor.tau", 1.0)
+    assert [run[name] for name in names] == pytest.approx(before, rel=1e-9)
+    run.step(0.01)
+    run.restore(state)
+    assert [run[name] for name in names] == pytest.approx(before, rel=1e-9)
+
+
 def test_a_hundred_hundredths_are_one() -> None:
     run = two_masses(1.0).compile().start()
     course(run, (), 100, 0.01)
