@@ -273,6 +273,9 @@ class Simulation:
         """Whether nothing happens up to a time in s, and the motion has come there."""
         if not self._is_smooth or self._settings.model.form.waves:
             return False
+        if end >= self._now.demand.span[1]:  # for which it was prepared
+            self._ahead = AHEAD * (end - self._t)
+            self._leave(self._moment)
         return self._now.advance(end)
 
     def _run_to(self, end: float, length: float) -> None:

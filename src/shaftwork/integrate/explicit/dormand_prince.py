@@ -119,6 +119,7 @@ class MachineSnapshot(NamedTuple):
         length: of the next step, s.
         longest: a step at most, s: far from the edge of stability, so that strong dampers have right torques.
         offsets: of the guards, if there are any.
+        atol: (n,) absolute tolerances; those of guards that are integrated depend on where the motion began.
     """
 
     t: float
@@ -127,6 +128,7 @@ class MachineSnapshot(NamedTuple):
     length: float
     longest: float
     offsets: Array | None
+    atol: Array
 
 
 class MachineSteps:
@@ -144,9 +146,9 @@ class MachineSteps:
             bound = bound_of_decay(jacobians(problem))
             offsets = None if guards is None else guards.offsets
             longest = 1 / bound if bound > 0 else np.inf
-            at = MachineSnapshot(problem.t0, problem.x0, pieces(problem)[0], 0.0, longest, offsets)
+            at = MachineSnapshot(problem.t0, problem.x0, pieces(problem)[0], 0.0, longest, offsets, problem.atol)
         elif guards is not None:
-            problem = changed(problem, guards=replace(guards, offsets=np.asarray(at.offsets)))
+            problem = changed(problem, atol=at.atol, guards=replace(guards, offsets=np.asarray(at.offsets)))
         self._problem, self._machine, self.at = _watching(problem, machine), machine, at
 
     def step(self, end: float) -> bool:
