@@ -93,6 +93,8 @@ class Coefficients:
         self._groups = tuple(
             (group, vectorised(group.template.symbols, group.template.law)) for group in groups_of(graph, linear)
         )
+        self.places = {place for group, _ in self._groups for place in group.places.ravel().tolist()}
+        """Of the parameters that they contain."""
 
     def __call__(self, p: Array) -> Array:
         """(branches,) coefficients; 0 for branches that have none.
@@ -153,6 +155,8 @@ class GainMatrix:
         ordered = sorted(symbols, key=lambda symbol: names[symbol.name])
         self._places = np.array([names[symbol.name] for symbol in ordered], dtype=np.intp)
         self._function = scalar({"p": ordered}, self._coefficients) if variable else None
+        self.places = {*self._places.tolist()}
+        """Of the parameters that it contains."""
 
     def _values(self, p: Array) -> dict[Expr, float]:
         assert self._function is not None  # noqa: S101 (there are coefficients)
