@@ -230,7 +230,7 @@ def checked_parameter(netlist: Netlist, name: str, value: Any) -> float:
         objection = "must be a number here: a law is part of the network, so build another network with it"
     if objection is not None:
         raise ParameterError(f"{type(part).__name__} '{owner}': {parameter} = {value!r} {objection}.")
-    if parameter not in _numbers(part):
+    if not isinstance(part.declared[parameter].magnitude(getattr(part, parameter))[0], float):
         reason = "was not given" if getattr(part, parameter) is None else "is no number"
         raise ParameterError(
             f"{type(part).__name__} '{owner}': {parameter} {reason} when the part was made, so that the equations have "
