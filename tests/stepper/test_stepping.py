@@ -253,6 +253,24 @@ def test_every_engine_comes_back_to_the_last_bit(name: str, engine: str) -> None
         assert on(again) == wanted
 
 
+@pytest.mark.parametrize("engine", ["heyoka", "numba"])
+def test_limits_that_move_with_time_come_back_to_the_last_bit(engine: str) -> None:
+    """They are integrated beside the motion, with tolerances that depend on where a span began."""
+    net = sw.Network("one way")
+    net.add(sw.TorqueSource("motor", tau=6.0 * sin(9.0 * T)), "a")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.Freewheel("free"), "a", "b")
+    net.add(sw.Inertia("J2", J=0.7), "b")
+    net.add(sw.CoulombLoad("load", tau=1.0), "b")
+    run = net.compile().start(rtol=RTOL, engine=engine)
+    for k in range(60):
+        course(run, (), 1 + k % 3, 0.031)
+        state = run.save_state()
+        wanted = course(run, ("J1.omega", "J2.omega"), 3, 0.031)
+        run.restore(state)
+        assert course(run, ("J1.omega", "J2.omega"), 3, 0.031) == wanted
+
+
 def test_modes_are_those_of_now() -> None:
     run = NETWORKS["friction"](0.0).compile().start(inputs=["motor.tau"])
     assert run.modes == {"load": "stuck"}

@@ -208,7 +208,7 @@ def checked_parameters(netlist: Netlist, parameters: Mapping[str, Any]) -> dict[
     values = {str(name): checked_parameter(netlist, str(name), value) for name, value in parameters.items()}
     changed = by_part(values)
     for part in (placed.part for placed in netlist.placed if placed.part.name in changed):
-        if type(part).__post_init__ is not Component.__post_init__:  # what the part says of values that do not go together
+        if type(part).__post_init__ is not Component.__post_init__:  # of values that do not go together
             dataclasses.replace(part, **changed[part.name])
     return values
 

@@ -6,7 +6,6 @@ that meets one are thrown away. Between the ends of its steps it makes them agai
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
