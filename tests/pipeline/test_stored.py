@@ -252,3 +252,8 @@ def test_a_stored_network_is_printed_as_before() -> None:
     """A record that is the default is not listed, also where it was read again."""
     net = sw.scenes.excavator()
     assert repr(pickle.loads(pickle.dumps(net))) == repr(net)  # noqa: S301
+
+
+def test_equations_with_speeds_that_no_store_fixes_are_stored() -> None:
+    equations = sw.scenes.bldc_shaft().equations()
+    assert str(pickle.loads(pickle.dumps(equations))) == str(equations)  # noqa: S301

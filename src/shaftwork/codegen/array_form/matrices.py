@@ -88,8 +88,8 @@ class MatrixAssembly:
         self.loops = link_matrix(form, form.tree.loops)
         self.cutsets = link_matrix(form, form.tree.cutsets) if form.loses_power else self.loops
         self.inputs = np.array([*form.laws, *form.across_inputs], dtype=np.intp)
-        evaluated = (self.coefficients, self.loops, self.cutsets, *([self.potentials] if form.readings else []))
-        self._places = sorted(set[int]().union(*(matrix.places for matrix in evaluated)))
+        gains = (self.loops, self.cutsets, *([self.potentials] if form.readings else []))
+        self._places = sorted(self.coefficients.places.union(*(matrix.places for matrix in gains)))
         self._last = BoundedCache[bytes, LinearPart](1)
 
     @cached_property
