@@ -246,3 +246,14 @@ def test_motions_come_back_from_other_processes(start: str) -> None:
         own = _peak(model, stiffness)
         assert same(sol["shaft.tau"], own["shaft.tau"])
         assert same(sol.at([0.033])["J2.omega"], own.at([0.033])["J2.omega"])
+
+
+def test_a_stored_network_is_printed_as_before() -> None:
+    """A record that is the default is not listed, also where it was read again."""
+    net = sw.scenes.excavator()
+    assert repr(pickle.loads(pickle.dumps(net))) == repr(net)  # noqa: S301
+
+
+def test_equations_with_speeds_that_no_store_fixes_are_stored() -> None:
+    equations = sw.scenes.bldc_shaft().equations()
+    assert str(pickle.loads(pickle.dumps(equations))) == str(equations)  # noqa: S301

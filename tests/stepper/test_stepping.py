@@ -253,6 +253,24 @@ def test_every_engine_comes_back_to_the_last_bit(name: str, engine: str) -> None
         assert on(again) == wanted
 
 
+@pytest.mark.parametrize("engine", ["heyoka", "numba"])
+def test_limits_that_move_with_time_come_back_to_the_last_bit(engine: str) -> None:
+    """They are integrated beside the motion, with tolerances that depend on where a span began."""
+    net = sw.Network("one way")
+    net.add(sw.TorqueSource("motor", tau=6.0 * sin(9.0 * T)), "a")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.Freewheel("free"), "a", "b")
+    net.add(sw.Inertia("J2", J=0.7), "b")
+    net.add(sw.CoulombLoad("load", tau=1.0), "b")
+    run = net.compile().start(rtol=RTOL, engine=engine)
+    for k in range(60):
+        course(run, (), 1 + k % 3, 0.031)
+        state = run.save_state()
+        wanted = course(run, ("J1.omega", "J2.omega"), 3, 0.031)
+        run.restore(state)
+        assert course(run, ("J1.omega", "J2.omega"), 3, 0.031) == wanted
+
+
 def test_modes_are_those_of_now() -> None:
     run = NETWORKS["friction"](0.0).compile().start(inputs=["motor.tau"])
     assert run.modes == {"load": "stuck"}
@@ -278,6 +296,20 @@ def test_steps_follow_travelling_waves() -> None:
     wanted = wanted.simulate(len(LEVELS) * HOLD, rtol=RTOL, t_eval=len(LEVELS) * STEPS + 1)
     run = two_masses(0.0, shaft=shaft).compile().start(inputs=["motor.tau"], rtol=RTOL)
     assert followed(run, wanted, "motor.tau") < 1e-9
+
+
+def test_what_waves_hold_is_told_after_setting_and_restoring() -> None:
+    """A wave is not in the states of an instant: its energy and power are those of the motion that goes on."""
+    shaft = sw.Shaft("shaft", length=10.0, diameter=0.1, model=sw.Wave())
+    run, names = two_masses(5.0, shaft=shaft).compile().start(), ("shaft.energy", "shaft.power", "shaft.tau_b")
+    run.step(0.01)
+    before = [run[name] for name in names if run.names]
+    state = run.save_state()
+    run.set("motor.tau", 1.0)
+    assert [run[name] for name in names] == pytest.approx(before, rel=1e-9)
+    run.step(0.01)
+    run.restore(state)
+    assert [run[name] for name in names] == pytest.approx(before, rel=1e-9)
 
 
 def test_a_hundred_hundredths_are_one() -> None:

@@ -99,9 +99,12 @@ class MachineProgram:
         except NumbaError as error:
             raise CompileError(f"'{title}' has a law that numba cannot compile: {error}") from error
 
-    def bind(self, p: Array) -> tuple[Any, Any, int, int, Array]:
+    def bind(self, p: Array) -> tuple[Any, Any, int, int, Callable[[Array], Array], Array]:
         """The code with its parameters, from those of the model, as `integrate.problem.MachineRates` has them."""
-        return (*self._code, np.concatenate([p, self._fixed.values(p)]))
+        return *self._code, self._values, self._values(p)
+
+    def _values(self, p: Array) -> Array:
+        return np.concatenate([p, self._fixed.values(p)])
 
 
 def _switches(rows: Rows) -> tuple[Expr, ...]:

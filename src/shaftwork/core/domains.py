@@ -23,6 +23,10 @@ class Domain:
     through: Quantity
     integral: Quantity
 
+    def __reduce__(self) -> str:
+        """Stored by its name below: there is one of each, and it is compared with `is`."""
+        return self.name.upper()
+
 
 ROTATION = Domain(
     "rotation",

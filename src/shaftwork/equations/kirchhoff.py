@@ -239,12 +239,16 @@ class _KirchhoffWriter:
                 yield Row(*self.origin((branch.index,)), partial(self.assembly.coupling, branch.index))
 
     def states(self) -> Iterator[StateEquation]:
-        systems = {"across": partial(_speeds, self.solution), "through": partial(_torques, self.solution)}
+        systems = {"across": self._system("speeds"), "through": self._system("torques")}
         for state in self.form.states:
             branch, system = state.branch, systems.get(state.kind)
             make = partial(_row, system, branch) if system else partial(self._integral_row, branch)
             symbol = Symbol(state.name, real=True)
             yield StateEquation(*self.origin((branch,)), make, state.name, symbol, state.unit, system)
+
+    def _system(self, name: str) -> Callable[[], EliminationSystem]:
+        """Makes one of the systems when it is wanted, so that rows can be stored."""
+        return partial(getattr, self.solution, name)
 
     def _integral_row(self, branch: int) -> Sides:
         link = branch in self.form.tree.loops
@@ -261,7 +265,7 @@ class _KirchhoffWriter:
             ends = self.assembly.ends(branch)
             where = " and ".join(self.graph.node_name(node) for node in ends if node != GROUND)
             why = f"no store at {where} fixes the speed across {self.part(branch)}; it follows from the balance"
-            make = partial(self.solution.algebraic.row, branch)
+            make = partial(_row, self._system("algebraic"), branch)
             yield Eliminated(*self._cutset(branch), make, f"across {self.part(branch)}", why, "algebraic")
         yield from self._reactions()
 
@@ -355,11 +359,3 @@ def _listed(names: Iterable[str]) -> str:
     if len(listed) > 6:
         listed = [*listed[:4], f"{len(listed) - 4} others"]
     return " and ".join(filter(None, (", ".join(listed[:-1]), listed[-1]))) if listed else "nothing"
-
-
-def _speeds(solution: SolvedForm) -> EliminationSystem:
-    return solution.speeds
-
-
-def _torques(solution: SolvedForm) -> EliminationSystem:
-    return solution.torques

@@ -88,13 +88,15 @@ class MachineRates(NamedTuple):
         watched: the same, (t, x, p, values (m,)): guards, and behind them switches.
         guards: how many of these are guards.
         switches: how many are switches.
-        p: (parameters,) their values.
+        values: from the parameters of the model to those of the code.
+        p: the latter.
     """
 
     rates: Any
     watched: Any
     guards: int
     switches: int
+    values: Callable[[Array], Array]
     p: Array
 
 

@@ -25,7 +25,7 @@ TABLE = {
 
 def model_schema() -> dict[str, Any]:
     """The schema, draft 2020-12. Types that are not of the library may have any parameter."""
-    kinds = {name: kind for name, kind in REGISTRY.items() if kind.__module__.startswith("shaftwork.")}
+    kinds = {name: kind for name, kind in REGISTRY.items() if kind.__module__.startswith("shaftwork.components.")}
     name = {"type": "string", "minLength": 1, "maxLength": MAXIMUM_NAME}
     names = {"type": "array", "items": name, "uniqueItems": True}
     wired = {"type": name, "name": name, "nodes": {"type": "array", "items": name, "minItems": 1}}

@@ -158,8 +158,8 @@ def _values(part: Component) -> str:
 
 
 def _is(value: Any, default: Any) -> bool:
-    numbers = isinstance(value, int | float) and isinstance(default, int | float)
-    return value is default or (numbers and bool(value == default))
+    alike = type(value) is type(default) or (isinstance(value, int | float) and isinstance(default, int | float))
+    return value is default or (alike and bool(value == default))
 
 
 def _short(value: Any) -> str:

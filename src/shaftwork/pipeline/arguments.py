@@ -208,7 +208,7 @@ def checked_parameters(netlist: Netlist, parameters: Mapping[str, Any]) -> dict[
     values = {str(name): checked_parameter(netlist, str(name), value) for name, value in parameters.items()}
     changed = by_part(values)
     for part in (placed.part for placed in netlist.placed if placed.part.name in changed):
-        if hasattr(part, "__post_init__"):  # what the part says of values that do not go together
+        if type(part).__post_init__ is not Component.__post_init__:  # of values that do not go together
             dataclasses.replace(part, **changed[part.name])
     return values
 
@@ -230,7 +230,7 @@ def checked_parameter(netlist: Netlist, name: str, value: Any) -> float:
         objection = "must be a number here: a law is part of the network, so build another network with it"
     if objection is not None:
         raise ParameterError(f"{type(part).__name__} '{owner}': {parameter} = {value!r} {objection}.")
-    if parameter not in _numbers(part):
+    if not isinstance(part.declared[parameter].magnitude(getattr(part, parameter))[0], float):
         reason = "was not given" if getattr(part, parameter) is None else "is no number"
         raise ParameterError(
             f"{type(part).__name__} '{owner}': {parameter} {reason} when the part was made, so that the equations have "

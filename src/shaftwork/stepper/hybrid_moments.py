@@ -62,6 +62,5 @@ def hybrid_moment(
         parameters={**model.parameters, **values},
         modes={machine.name: name for machine, name in pairs},
         words={machine.name: machine.modes[name].words for machine, name in pairs},
-        problem=lambda p: equations.problem(regime.modes, p),
         steps=smooth_steps(regime.model, problem, demand, place),
     )

@@ -127,7 +127,6 @@ class Moment:
         bind: makes the equations with a parameter vector.
         stored: from the equations, a time in s and the states to all that is stored.
         parameters: of the network, by name.
-        problem: from parameters (p,) to the motion with them.
         modes: by element that changes its mode.
         words: the same in the words of phases.
         steps: by which it goes on while nothing happens, or None where there are none.
@@ -143,7 +142,6 @@ class Moment:
     bind: Callable[[Array], BoundArrays]
     stored: Callable[[Callable[[], BoundArrays], float, Array], Mapping[str, float]]
     parameters: Mapping[str, float]
-    problem: Callable[[Array], Problem]
     modes: Mapping[str, str] = field(default_factory=dict)
     words: Mapping[str, str] = field(default_factory=dict)
     steps: Any = None
@@ -167,7 +165,7 @@ class Moment:
             return False
         vector = self.vector.copy()
         vector[place] = value
-        if not self.steps.with_parameters(vector, lambda: self.problem(vector[: len(self.model.parameters)])):
+        if not self.steps.with_parameters(vector):
             return False
         self.vector, self.parameters, self._lists = vector, {**self.parameters, name: value}, None
         return True
@@ -265,7 +263,6 @@ def plain_moment(
         stored=StateTransfer(form).at_once,
         parameters={**model.parameters, **values},
         steps=smooth_steps(model, prepared.problem(x, demand), demand, place),
-        problem=lambda p: model.prepare(p).problem(x, demand),
     )
 
 
@@ -288,8 +285,8 @@ def smooth_steps(model: CompiledModel, problem: Problem, demand: Demand, place: 
         return SmoothSteps(problem, at) if SmoothSteps.suit(problem) else None
     from shaftwork.integrate.explicit.dormand_prince import MachineSteps
 
-    exact = demand.engine == "auto" and problem.linear is not None
-    return None if exact or problem.machine is None else MachineSteps(problem, at)
+    machine = None if demand.engine == "auto" and problem.linear is not None else problem.machine
+    return None if machine is None else MachineSteps(problem, machine, at)
 
 
 def smooth_engine(engine: str) -> str:

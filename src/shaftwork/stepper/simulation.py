@@ -142,7 +142,11 @@ class Simulation:
             SignalError: there is no such quantity; the message lists what the part has.
             SimulationError: it has no finite value here.
         """
-        if self._motion is None or self._moment is not None:
+        model = self._settings.model
+        if self._motion is None and model.form.waves:  # what is on its way is known of a motion alone
+            span = self._t, self._t + self._ahead / AHEAD
+            self._motion = model.run_once(self._settings.in_model, self._origin, self._demand(span)).at([self._t])
+        if self._motion is None:
             return self._now[name]
         value = self._motion[name][-1]
         return value if np.ndim(value) else float(value)
@@ -269,6 +273,9 @@ class Simulation:
         """Whether nothing happens up to a time in s, and the motion has come there."""
         if not self._is_smooth or self._settings.model.form.waves:
             return False
+        if end >= self._now.demand.span[1]:  # for which it was prepared
+            self._ahead = AHEAD * (end - self._t)
+            self._leave(self._moment)
         return self._now.advance(end)
 
     def _run_to(self, end: float, length: float) -> None:
@@ -286,6 +293,5 @@ class Simulation:
         if self._options.engine == "auto" and not model.phased and not model.form.waves and model.states:
             self._engine = motion.engine  # to choose anew takes longer than many a step
         self._origin = ending = handed_over(motion, {**model.parameters, **values})
-        # what is on its way is known of a motion alone; else it is read where no moment is made anyway
-        if model.form.waves or not (self._is_smooth or ending.read != end):
+        if ending.read == end and (model.form.waves or not self._is_smooth):  # where no moment is made anyway
             self._motion = motion

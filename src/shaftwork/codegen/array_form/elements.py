@@ -14,6 +14,7 @@ from scipy import sparse
 from sympy import Expr
 
 from shaftwork.codegen.code import scalar, vectorised
+from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import ParameterError
 from shaftwork.formulation.form import StateForm
 from shaftwork.formulation.gains import Gain, Number, any_sum_vanishes, coefficients_in, fold, value_of
@@ -93,6 +94,8 @@ class Coefficients:
         self._groups = tuple(
             (group, vectorised(group.template.symbols, group.template.law)) for group in groups_of(graph, linear)
         )
+        self.places = {place for group, _ in self._groups for place in group.places.ravel().tolist()}
+        """Of the parameters that they contain."""
 
     def __call__(self, p: Array) -> Array:
         """(branches,) coefficients; 0 for branches that have none.
@@ -153,6 +156,9 @@ class GainMatrix:
         ordered = sorted(symbols, key=lambda symbol: names[symbol.name])
         self._places = np.array([names[symbol.name] for symbol in ordered], dtype=np.intp)
         self._function = scalar({"p": ordered}, self._coefficients) if variable else None
+        self.places = {*self._places.tolist()}
+        """Of the parameters that it contains."""
+        self._vanishes = BoundedCache[bytes, bool](1)
 
     def _values(self, p: Array) -> dict[Expr, float]:
         assert self._function is not None  # noqa: S101 (there are coefficients)
@@ -172,7 +178,9 @@ class GainMatrix:
 
     def degenerates(self, p: Array) -> bool:
         """Whether ratios meet at p that differ in the network, so that other equations hold there."""
-        return bool(self._gains) and any_sum_vanishes(self._gains, self._values(p))
+        if not self._gains:
+            return False
+        return self._vanishes(p[self._places].tobytes(), lambda: any_sum_vanishes(self._gains, self._values(p)))
 
     def __call__(self, p: Array) -> Any:
         """The matrix as scipy.sparse.csr_array."""

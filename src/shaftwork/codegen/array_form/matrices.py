@@ -31,6 +31,7 @@ from shaftwork.codegen.array_form.elements import (
     link_matrix,
     node_matrix,
 )
+from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import CompileError
 from shaftwork.formulation.form import StateForm
 from shaftwork.formulation.value_diagnosis import is_singular
@@ -87,6 +88,9 @@ class MatrixAssembly:
         self.loops = link_matrix(form, form.tree.loops)
         self.cutsets = link_matrix(form, form.tree.cutsets) if form.loses_power else self.loops
         self.inputs = np.array([*form.laws, *form.across_inputs], dtype=np.intp)
+        gains = (self.loops, self.cutsets, *([self.potentials] if form.readings else []))
+        self._places = sorted(self.coefficients.places.union(*(matrix.places for matrix in gains)))
+        self._last = BoundedCache[bytes, LinearPart](1)
 
     @cached_property
     def potentials(self) -> GainMatrix:
@@ -98,11 +102,14 @@ class MatrixAssembly:
         return self.loops.degenerates(p) or (self.cutsets is not self.loops and self.cutsets.degenerates(p))
 
     def __call__(self, p: Array) -> LinearPart:
-        """Assemble for the parameter vector p.
+        """Assemble for the parameter vector p; the last one is kept, as many a parameter stands in laws alone.
 
         Raises:
             CompileError: a block of the algebraic equations is singular for these values; names its branches.
         """
+        return self._last(p[self._places].tobytes(), lambda: self._sparse(p))
+
+    def _sparse(self, p: Array) -> LinearPart:
         part = self._assembled(lambda entries: entries(p))
         fields = {field.name: getattr(part, field.name) for field in dataclasses.fields(part)}
         return LinearPart(

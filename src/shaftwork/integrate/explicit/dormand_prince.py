@@ -6,7 +6,6 @@ that meets one are thrown away. Between the ends of its steps it makes them agai
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -119,6 +118,7 @@ class MachineSnapshot(NamedTuple):
         length: of the next step, s.
         longest: a step at most, s: far from the edge of stability, so that strong dampers have right torques.
         offsets: of the guards, if there are any.
+        atol: (n,) absolute tolerances; those of guards that are integrated depend on where the motion began.
     """
 
     t: float
@@ -127,6 +127,7 @@ class MachineSnapshot(NamedTuple):
     length: float
     longest: float
     offsets: Array | None
+    atol: Array
 
 
 class MachineSteps:
@@ -134,26 +135,27 @@ class MachineSteps:
 
     Args:
         problem: the motion up to its next breakpoint.
+        machine: its right-hand side.
         at: goes on from there, in equal equations; by default from the start of the problem.
     """
 
-    def __init__(self, problem: Problem, at: MachineSnapshot | None = None) -> None:
+    def __init__(self, problem: Problem, machine: MachineRates, at: MachineSnapshot | None = None) -> None:
         guards = problem.guards
         if at is None:
             bound = bound_of_decay(jacobians(problem))
             offsets = None if guards is None else guards.offsets
             longest = 1 / bound if bound > 0 else np.inf
-            at = MachineSnapshot(problem.t0, problem.x0, pieces(problem)[0], 0.0, longest, offsets)
+            at = MachineSnapshot(problem.t0, problem.x0, pieces(problem)[0], 0.0, longest, offsets, problem.atol)
         elif guards is not None:
-            problem = changed(problem, guards=replace(guards, offsets=np.asarray(at.offsets)))
-        self._problem, self.at = problem, at
+            problem = changed(problem, atol=at.atol, guards=replace(guards, offsets=np.asarray(at.offsets)))
+        self._problem, self._machine, self.at = _watching(problem, machine), machine, at
 
     def step(self, end: float) -> bool:
         """Go on to a time in s; False where something happens on the way, and nothing has been done."""
-        at, machine = self.at, self._problem.machine
-        if machine is None or end >= at.piece.end or end - at.t > MOST_SMOOTH * at.longest:
+        at = self.at
+        if end >= at.piece.end or end - at.t > MOST_SMOOTH * at.longest:
             return False
-        stepper = _MachineStepper(self._problem, machine, at.longest)
+        stepper = _MachineStepper(self._problem, self._machine, at.longest)
         stepper.resume(at, end)
         try:
             step = stepper.step(at.t, at.x)
@@ -164,14 +166,10 @@ class MachineSteps:
         self.at = at._replace(t=end, x=step.state, length=stepper.length)
         return True
 
-    def with_parameters(self, _p: Array, problem_with: Callable[[], Problem]) -> bool:
-        """Go on in the same equations with other parameters, those of a problem."""
-        problem, old = problem_with(), self._problem.guards
-        guards = problem.guards
-        if guards is not None and old is not None:
-            old = replace(old, values=guards.values)
-        values = {"rhs": problem.rhs, "machine": problem.machine, "switches": problem.switches, "guards": old}
-        self._problem, self.at = changed(self._problem, **values), self.at._replace(length=0.0)
+    def with_parameters(self, p: Array) -> bool:
+        """Go on in the same equations with other parameters (p,) of the model."""
+        self._machine = self._machine._replace(p=self._machine.values(p))
+        self._problem = _watching(self._problem, self._machine)
         return True
 
 

@@ -6,7 +6,6 @@ microseconds; what a whole run looks at before and after would take a hundred ti
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,6 +31,7 @@ class Snapshot(NamedTuple):
         parameters: (p,) all of the program: signs of conditions and sides of guards are among them.
         end: where they end at the latest, s.
         begins: whether the motion begins here, or with other parameters: then its first series is looked at.
+        atol: (n,) absolute tolerances; those of guards that are integrated depend on where the motion began.
     """
 
     t: float
@@ -39,6 +39,7 @@ class Snapshot(NamedTuple):
     parameters: Array
     end: float
     begins: bool
+    atol: Array
 
 
 class SmoothSteps:
@@ -50,7 +51,7 @@ class SmoothSteps:
     """
 
     def __init__(self, problem: Problem, at: Snapshot | None = None) -> None:
-        self._program, self._tolerance, self._atol = problem.program.program, tolerance(problem), problem.atol
+        self._program, self._tolerance = problem.program.program, tolerance(problem)
         with self._program.lent(self._tolerance) as lent:
             self._orders = np.arange(lent.integrator.order + 1.0)
         self.at = self._beginning(problem) if at is None else at
@@ -64,14 +65,13 @@ class SmoothSteps:
         piece = pieces(problem)[0]
         with self._program.lent(self._tolerance) as lent:
             TaylorRun(problem, lent).begin(piece)
-            return Snapshot(
-                piece.start, lent.integrator.state.copy(), lent.integrator.pars.copy(), piece.end, begins=True
-            )
+            x, parameters = lent.integrator.state.copy(), lent.integrator.pars.copy()
+            return Snapshot(piece.start, x, parameters, piece.end, begins=True, atol=problem.atol)
 
     def step(self, end: float) -> bool:
         """Go on to a time in s; False where something happens on the way, and nothing has been done."""
-        _, _, parameters, last, begins = self.at
-        if end >= last:
+        begins = self.at.begins
+        if end >= self.at.end:
             return False
         with self._program.lent(self._tolerance) as lent:
             integrator = lent.integrator
@@ -90,13 +90,13 @@ class SmoothSteps:
                     break
             else:
                 return False
-            after = Snapshot(end, integrator.state.copy(), parameters, last, begins=False)
+            after = self.at._replace(t=end, x=integrator.state.copy(), begins=False)
         if not np.isfinite(after.x).all() or not self._is_clear(after):
             return False
         self.at = after
         return True
 
-    def with_parameters(self, p: Array, _problem_with: Callable[[], Problem]) -> bool:
+    def with_parameters(self, p: Array) -> bool:
         """Go on with other parameters (p,) of the model; False where that changes more than they, and nothing has."""
         program, at = self._program, self.at
         parameters, values = at.parameters.copy(), program.bind(p).parameters
@@ -138,7 +138,7 @@ class SmoothSteps:
         state = np.ascontiguousarray(states[:, 0])
         change = terms @ (self._orders * powers[:, 0])
         defect = np.abs(elapsed[0] * program.slopes(start + elapsed[0], state, parameters) - change)
-        if not (defect <= DEFECT * (np.abs(state) + np.abs(change)) + self._atol).all():
+        if not (defect <= DEFECT * (np.abs(state) + np.abs(change)) + self.at.atol).all():
             return False
         if program.all_timed:
             return True
