@@ -60,7 +60,7 @@ def test_tables_and_noise_have_machine_code() -> None:
 @pytest.mark.parametrize("scene", ["crane", "excavator"])
 def test_machine_code_watches_every_switch_of_the_laws(scene: str) -> None:
     model, random = getattr(sw.scenes, scene)().compile(), np.random.default_rng(0)
-    _, watched, guards, count, p = model.machine_program.bind(model.defaults)
+    _, watched, guards, count, _, p = model.machine_program.bind(model.defaults)
     times, states = random.uniform(0.0, 5.0, 40), random.normal(0.0, 50.0, (40, len(model.states)))
     values, call = np.empty((40, guards + count)), numba.njit(lambda f, t, x, p, y: f(t, x, p, y))
     for time, x, row in zip(times, states, values, strict=True):

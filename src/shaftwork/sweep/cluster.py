@@ -8,8 +8,6 @@ from dataclasses import replace
 from typing import Any
 from uuid import uuid4
 
-import numpy as np
-
 from shaftwork.core.errors import ParameterError, SimulationError, imported
 from shaftwork.results.observer import Array
 from shaftwork.sweep.sweep_task import SIDE_BY_SIDE, Chunk, Index, Task, Worker
@@ -54,7 +52,7 @@ class _Calls:
 
     Args:
         task: the sweep.
-        parts: variants of each chunk.
+        parts: variants of each call.
         client: of Dask.
         completed: its futures, as they are done.
     """
@@ -62,8 +60,7 @@ class _Calls:
     def __init__(self, task: Task, parts: Sequence[Index], client: Any, completed: Any) -> None:
         self._task, self._client, self.completed = task, client, completed
         self._key, self._head = uuid4().hex, replace(task, columns=task.rows(slice(0, SIDE_BY_SIDE)))
-        # a call over a network costs some milliseconds: eight chunks of one process are worth that
-        self._rest = [np.concatenate(parts[first : first + 8]) for first in range(0, len(parts), 8)][::-1]
+        self._rest = [*parts][::-1]
         self._losses: dict[int, int] = {}
         self.waiting: dict[Any, Index] = {}
         """Variants by future."""

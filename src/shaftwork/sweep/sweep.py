@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import nullcontext
 from itertools import compress
 from pathlib import Path
@@ -33,7 +33,7 @@ from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
 from shaftwork.sweep.sweep_result import VERDICTS, Limits, Sweep
 from shaftwork.sweep.sweep_store import Store
-from shaftwork.sweep.sweep_task import Chunk, Reader, Task, Worker, chunks
+from shaftwork.sweep.sweep_task import Chunk, Index, Reader, Task, Worker, chunks, parted
 
 LEFT = "a zero, an impact, a stiff motion or a change of mode that is not beyond doubt is left to `simulate`"
 """Why variants have left those beside them."""
@@ -150,13 +150,23 @@ def _run(task: Task, processes: int | None, on: Any, path: str | Path | None) ->
         for chunk in store.chunks if store else []:
             take(chunk)
         with progress(len(task), "variants", "compiling") as show:
-            for chunk in chunks(worker, task, np.flatnonzero(open_), processes, on):
+            for chunk in _chunks(worker, task, np.flatnonzero(open_), processes, on):
                 if store:
                     store.append(chunk)
                 take(chunk)
                 show(len(task) - int(open_.sum()), f"{failed} failed" if failed else "sweep")
     why = worker.why or (f"{alone} of {len(task)} variants ran one by one: {LEFT}" if alone else "")
     return values, tuple(reasons), why
+
+
+def _chunks(worker: Worker, task: Task, variants: Index, processes: int | None, on: Any) -> Iterator[Chunk]:
+    """Chunks of variants as they are done, on this machine or on the workers of a cluster."""
+    if on is None:
+        return chunks(worker, task, variants, processes)
+    from shaftwork.sweep.cluster import on_cluster
+
+    # a call over a network costs some milliseconds: eight chunks of one process are worth that
+    return on_cluster(task, parted(variants, 8 * worker.chunk), on)
 
 
 def _columns(netlist: Netlist, parameters: Any, samples: Any) -> dict[str, Array]:

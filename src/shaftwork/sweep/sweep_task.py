@@ -266,7 +266,7 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def chunks(worker: Worker, task: Task, variants: Index, processes: int | None, on: Any = None) -> Iterator[Chunk]:
+def chunks(worker: Worker, task: Task, variants: Index, processes: int | None) -> Iterator[Chunk]:
     """Chunks as they are done.
 
     Args:
@@ -275,16 +275,10 @@ def chunks(worker: Worker, task: Task, variants: Index, processes: int | None, o
         variants: (k,) what is to be done.
         processes: how many; None for as many as there are cores. Variants side by side take to them only where what is
             left takes long enough, others also where so many are asked for.
-        on: a client of Dask, whose workers do it; None for this machine.
     """
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         sys.exit(1)  # a script without a guard, run again by a process that it has started: the first one says so
-    parts = [variants[first : first + worker.chunk] for first in range(0, variants.size, worker.chunk)]
-    if on is not None:
-        from shaftwork.sweep.cluster import on_cluster
-
-        yield from on_cluster(task, parts, on)
-        return
+    parts = parted(variants, worker.chunk)
     count = processes if processes is not None else cores() if _can_be_sent(task) else 1
     if processes is not None and count > 1 and worker.why:
         yield from _in_processes(task, parts, count)
@@ -297,6 +291,11 @@ def chunks(worker: Worker, task: Task, variants: Index, processes: int | None, o
         if number and count > 1 and (time.monotonic() - began) * left > 8.0:  # the first one compiles
             yield from _in_processes(task, parts[number + 1 :], count)
             return
+
+
+def parted(variants: Index, size: int) -> list[Index]:
+    """Variants in chunks of a size."""
+    return [variants[first : first + size] for first in range(0, variants.size, size)]
 
 
 def _can_be_sent(task: Task) -> bool:
