@@ -137,6 +137,16 @@ def test_names_that_are_no_identifiers_are_flat(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("name", ["unit", "fmi3", "unit_config", "instance"])
+def test_a_network_may_be_called_what_the_code_of_a_unit_uses(name: str, version: str, tmp_path: Path) -> None:
+    net = sw.Network(name)
+    net.add(sw.TorqueSource("motor", tau=1.0), "rotor")
+    net.add(sw.Inertia("J", J=2.0), "rotor")
+    net.compile().to_fmu(tmp_path / "any.fmu", version=version)
+    assert fmpy.simulate_fmu(str(tmp_path / "any.fmu"), stop_time=1.0)["J.omega"][-1] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("kind", KINDS)
 def test_it_moves_as_the_network(unit: Units, version: str, kind: str) -> None:
     """Tolerated is some ten times what CVODE, of low order, leaves at a tolerance of 1e-10."""

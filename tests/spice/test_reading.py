@@ -332,6 +332,13 @@ def test_numbers_have_suffixes_and_units(text: str, value: float) -> None:
     assert pytest.approx(value, rel=1e-15) == circuit.network.parts[0].R
 
 
+def test_a_mil_is_a_milli_in_parameters_as_in_ngspice() -> None:
+    """ngspice gives 0.02477 V at node 2: 25.4e-6 over 25.4e-6 + 1e-3."""
+    circuit = sw.spice.read("t\n.param a=1mil\nV1 1 0 1\nR1 1 2 {a}\nR2 2 0 1mil\n.tran 1m 10m\n.end\n")
+    values = {placed.part.name: placed.part for placed in circuit.network.netlist().placed}
+    assert (values["R1"].R, values["R2"].R) == (1e-3, 25.4e-6)
+
+
 def test_node_0_is_the_ground_and_names_of_nodes_have_no_case() -> None:
     circuit = sw.spice.read("title\nV1 IN GND 1\nR1 in Out 1\nR2 OUT 0 1\n")
     assert circuit.network.nodes == ("in", "ground", "out")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from shaftwork.ccode.c_texts import runtime_names
+from shaftwork.ccode.c_texts import names_in
 from shaftwork.ccode.writer import CodeWriter, Variable
 from shaftwork.components.laws import as_expression
 from shaftwork.core.errors import CompileError, ParameterError
@@ -121,7 +121,11 @@ def _files(name: str) -> tuple[str, str, str]:
 
 def is_taken(name: str) -> bool:
     """Whether a name stands for something in the code that is the same for all models."""
-    return name in RESERVED or name in runtime_names() or re.fullmatch(r"[a-z]\d+", name) is not None
+    return (
+        name in RESERVED
+        or name in names_in("shaftwork.ccode", "runtime")
+        or re.fullmatch(r"[a-z]\d+", name) is not None
+    )
 
 
 def checked_name(name: Any) -> str:

@@ -50,8 +50,8 @@ def filled(text: str, name: str, places: Mapping[str, object]) -> str:
 
 
 @cache
-def runtime_names() -> frozenset[str]:
-    """All names and words in the C code that is the same for all models; only asked for membership."""
-    folder = files(__package__ or "").joinpath("runtime")
-    texts = (re.sub(r"/\*.*?\*/", "", file.read_text(encoding="utf-8"), flags=re.DOTALL) for file in folder.iterdir())
-    return frozenset(word for text in texts for word in re.findall(r"[A-Za-z_]\w*", text))
+def names_in(package: str, folder: str) -> frozenset[str]:
+    """All names and words in the C code of a package that is the same for all models; only asked for membership."""
+    texts = (file.read_text(encoding="utf-8") for file in files(package).joinpath(folder).iterdir())
+    codes = (re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL) for text in texts)
+    return frozenset(word for code in codes for word in re.findall(r"[A-Za-z_]\w*", code))

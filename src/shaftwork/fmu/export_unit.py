@@ -15,7 +15,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from shaftwork.ccode.c_export import CCode, c_code
+from shaftwork.ccode.c_export import CCode, c_code, c_name
+from shaftwork.ccode.c_texts import names_in
 from shaftwork.ccode.equation_set import EquationSet
 from shaftwork.ccode.writer import Variable
 from shaftwork.core.errors import CompileError, ParameterError
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
     from shaftwork.pipeline.model import Model
 
 VERSIONS = ("3.0", "2.0")
+SOURCES = ("unit.c", "fmi2.c", "fmi3.c", "unit.h", "unit_api.inc", "unit_config.h")
+"""Files beside those of the model."""
 _KINDS = {"both": KINDS, "model exchange": KINDS[:1], "co-simulation": KINDS[1:]}
 _SYSTEMS = {"Linux": "linux", "Darwin": "darwin", "Windows": "windows"}
 _MACHINES = {"amd64": "x86_64", "arm64": "aarch64", "i686": "x86"}
@@ -74,15 +77,17 @@ def export_unit(
 
 def _code(model: Model, inputs: Sequence[str], outputs: Sequence[str] | None) -> CCode:
     """The C code; states are read in any case, and what is stored and no state in any mode is an output like others."""
+    plain, words = c_name(model.name), names_in("shaftwork.fmu", "sources")
+    name = f"{plain}_model" if plain in words or f"{plain}.c" in SOURCES else None
     if outputs is None:
-        return c_code(model, inputs=inputs)
+        return c_code(model, name=name, inputs=inputs)
     if isinstance(outputs, str):
         raise ParameterError(f"outputs = {outputs!r} must be a list of names, such as [{outputs!r}].")
-    code = c_code(model, inputs=inputs, outputs=[name for name in outputs if name not in model.states])
+    code = c_code(model, name=name, inputs=inputs, outputs=[one for one in outputs if one not in model.states])
     states = {variable.name for variable in code.states}  # only asked for membership
-    if states >= {name for name in outputs if name in model.states}:
+    if states >= {one for one in outputs if one in model.states}:
         return code
-    return c_code(model, inputs=inputs, outputs=[name for name in outputs if name not in states])
+    return c_code(model, name=name, inputs=inputs, outputs=[one for one in outputs if one not in states])
 
 
 def _dependencies(model: Model, code: CCode) -> dict[str, tuple[str, ...]]:

@@ -19,7 +19,7 @@ SCALES |= {"n": 1e-9, "p": 1e-12, "f": 1e-15}
 """Suffixes of numbers, without case: a mega is "meg", a milli "m"."""
 _DIGITS = r"(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?"
 _NUMBER = re.compile(rf"([-+]?{_DIGITS})(meg|mil|[tgkmuµμnpf])?[a-zµμ°Ω]*", re.IGNORECASE)
-_IN_TEXT = re.compile(rf"(?<![\w.])({_DIGITS})(meg|mil|[tgkmuµμnpf])?\w*", re.IGNORECASE)
+_IN_TEXT = re.compile(rf"(?<![\w.])({_DIGITS})(meg|[tgkmuµμnpf])?\w*", re.IGNORECASE)  # there 1mil is 1m to ngspice
 _NAME = re.compile(r"[A-Za-z_]\w*")
 FUNCTIONS = {"abs": "Abs", "max": "Max", "min": "Min", "u": "Heaviside", "H": "Heaviside", "sgn": "sign", "ln": "log"}
 """Functions of netlists that have another name in laws."""
@@ -93,7 +93,7 @@ class NetlistValues:
             said, text = inner.texts[name]
             inner.reading.append(name)
             try:
-                inner.numbers[name] = self._constant(said, text, inner)
+                inner.numbers[name] = self._constant(said, f"{{{text}}}", inner)
             finally:
                 inner.reading.pop()
         if name not in inner.numbers:
