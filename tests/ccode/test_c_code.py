@@ -297,3 +297,29 @@ def test_a_motion_that_is_too_stiff_says_so(tmp_path: Path) -> None:
     library.struct.most_steps = 1000
     with pytest.raises(AssertionError, match="the motion is stiff"):
         library.call("integrate", 2.0, RTOL)
+
+
+def geared() -> sw.Network:
+    net = sw.Network("geared")
+    net.add(sw.Inertia("J1", J=1.0), "fast")
+    net.add(sw.Gear("gear", ratio=2.0), "fast", "slow")
+    net.add(sw.Inertia("J2", J=4.0), "slow")
+    net.add(sw.Damper("bearing", d=0.1), "slow")
+    return net
+
+
+def test_the_start_value_of_a_state_counts_whatever_a_gear_ties_to_it(tmp_path: Path) -> None:
+    library = Library(c_code(geared().compile()), tmp_path)
+    library.struct.start[library.code.stores.index("J1.omega")] = 10.0
+    library.call("start", 0.0)
+    assert library.outputs()["J2.omega"] == pytest.approx(5.0, rel=1e-15)
+    library.struct.start[library.code.stores.index("J2.omega")] = 5.0  # as it follows
+    library.call("start", 0.0)
+    assert library.outputs()["J2.omega"] == pytest.approx(5.0, rel=1e-15)
+
+
+def test_start_values_that_contradict_each_other_are_a_fault(tmp_path: Path) -> None:
+    library = Library(c_code(geared().compile()), tmp_path)
+    library.struct.start[library.code.stores.index("J2.omega")] = 7.0
+    with pytest.raises(Exception, match="start values contradict each other"):
+        library.call("start", 0.0)

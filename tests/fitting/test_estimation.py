@@ -94,3 +94,24 @@ def test_what_the_data_cannot_tell_is_a_direction_of_infinite_spread() -> None:
     assert np.abs(found.directions[1]) == pytest.approx([0.0, 1.0])
     assert np.isinf(found.covariance[1, 1])
     assert found.covariance[0, 0] == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize("loss", LOSSES)
+def test_intervals_of_every_loss_are_as_wide_as_estimates_spread(loss: str) -> None:
+    x, slopes, stated = np.linspace(0.0, 1.0, 100), [], []
+    for seed in range(200):
+        y = 1.0 + 2.0 * x + np.random.default_rng(seed).normal(0.0, 0.1, x.size)
+        found = estimate(Line(x), data(y, loss=loss), np.array([1.0, 2.0]), ANYWHERE)
+        slopes.append(found.unknowns[1])
+        stated.append(found.covariance[1, 1] ** 0.5)
+    # the deviation of 200 values is known to 5 percent
+    assert np.mean(stated) == pytest.approx(np.std(slopes), rel=0.12)
+
+
+def test_a_fit_that_does_not_end_says_so() -> None:
+    class Wandering(Line):
+        def slopes(self, _: Array) -> Array:
+            return np.asarray(-self._columns)  # uphill
+
+    found = estimate(Wandering(np.linspace(0.0, 1.0, 5)), data(np.ones(5), np.array([1.0])), np.full(2, 9.0), ANYWHERE)
+    assert np.isfinite(found.unknowns).all()

@@ -122,3 +122,29 @@ def test_what_is_wrong_is_said(change: dict[str, object], words: str) -> None:
     arguments: dict[str, object] = {"variables": {"gear.ratio": (2.0, 60.0)}, "goal": "end JL.omega", **change}
     with pytest.raises(sw.ParameterError, match=words):
         sw.optimize(axis(), t_end=1.0, **arguments)  # type: ignore[arg-type]
+
+
+def test_a_design_without_motion_is_no_design() -> None:
+    net = axis()
+    net.add(sw.TorqueSource("pole", tau=sw.Table([0.0, 50.0, 50.1], [0.0, 0.0, 1e9])(sw.omega)), "drum")
+    made = sw.optimize(
+        net,
+        {"motor.tau": (0.5, 1000.0)},
+        lambda values: -values["motor.tau"],
+        t_end=1.0,
+        require={"max JL.omega": (None, 1e6)},
+        starts=3,
+    )
+    assert np.isfinite(made.best.goals["max JL.omega"])
+
+
+def test_the_name_of_the_goal_is_no_name_of_a_function() -> None:
+    with pytest.raises(sw.ParameterError, match="is the name of the goal"):
+        sw.optimize(
+            axis(),
+            {"gear.ratio": (2.0, 60.0)},
+            "end JL.omega",
+            t_end=1.0,
+            functions={"objective": lambda values: values["gear.ratio"]},
+            require={"objective": (None, 3.0)},
+        )

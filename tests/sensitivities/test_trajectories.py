@@ -62,3 +62,22 @@ def test_what_is_wrong_with_times_and_names_is_said() -> None:
         sw.studies.trajectory_sensitivities(net, "shaft.tua", [1.0])
     with pytest.raises(sw.ParameterError, match="is no state"):
         sw.studies.trajectory_sensitivities(net, "shaft.tau", [1.0], starts="motor.omega")
+
+
+def test_a_start_value_moves_the_speeds_inside_a_shaft_as_well() -> None:
+    net = sw.Network("shaft")
+    net.add(sw.Inertia("J1", J=2.0), "a")
+    net.add(
+        sw.Shaft("line", length=2.0, diameter=0.25, density=7850.0, shear_modulus=8e10, model=sw.Lumped(4)), "a", "b"
+    )
+    net.add(sw.Inertia("J2", J=3.0), "b")
+    t, start = np.linspace(0.0, 0.004, 5), {"J1.omega": 5.0, "line.omega_b": 1.0}
+    made = sw.studies.trajectory_sensitivities(
+        net, "J2.omega", t, parameters=["J1.J"], starts="J1.omega", initial=start
+    )
+    high, low = (
+        net.simulate(0.004, initial={**start, "J1.omega": 5.0 + sign}, t_eval=t, rtol=1e-12)["J2.omega"]
+        for sign in (1, -1)
+    )
+    # the motion is linear in its start, and known to 1e-12
+    assert made["J2.omega"]["J1.omega"] == pytest.approx((high - low) / 2, abs=1e-7)

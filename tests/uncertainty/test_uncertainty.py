@@ -117,6 +117,7 @@ def test_a_failed_sample_counts_as_passing_a_limit() -> None:
 
     made = uncertainty(broken, {"a": (0.0, 1.0)}, samples=400)
     assert made.probability("y", above=1.0).value == made.sweep.failed.mean() > 0.4
+    assert made.probability("y", above=1.0).low == 0.0  # nothing is known of them
     assert made.values("y").size == 400 - made.sweep.failed.sum()
     with pytest.raises(sw.ParameterError, match="indices need all of them"):
         uncertainty(broken, {"a": (0.0, 1.0)}, samples=64, method="sobol").indices("y")
@@ -140,7 +141,7 @@ def test_bands_over_seeds_take_each_seed_once() -> None:
     net.add(sw.TorqueSource("motor", tau=20.0), "wheel")
     net.add(sw.RandomLoad("soil", mean=10.0, std=2.0, interval=0.05, seed=1), "wheel")
     net.add(sw.Inertia("J", J=2.0), "wheel")
-    made = sw.studies.bands(net, "J.omega", [0.0, 1.0], {"soil.seed": range(5)})
+    made = sw.studies.bands(net, "J.omega", [0.0, 1.0], {"soil.seed": np.arange(5.0)})
     assert made.parameters["soil.seed"].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
     assert len({*made.courses[:, 1].tolist()}) == 5
 
@@ -185,3 +186,21 @@ def test_pictures_and_tables_show_all_measures() -> None:
     text = str(made)
     assert text.startswith("two motors: 128 samples, 0 failed")
     assert "two.tau" in text
+
+
+def test_discrete_distributions_stay_within_their_values() -> None:
+    for distribution in (stats.randint(1, 5), stats.binom(5, 0.5)):
+        made = uncertainty(lambda columns: {"y": columns["a"]}, {"a": distribution}, method="morris", samples=20)
+        assert set(made.sweep.parameters["a"]) <= {float(k) for k in range(6)} - (
+            {0.0} if distribution.support()[0] else set()
+        )
+
+
+def test_where_all_samples_fail_the_table_says_why() -> None:
+    def broken(columns: Columns) -> Columns:
+        return {"y": np.full(columns["a"].size, np.nan)}
+
+    assert (
+        str(uncertainty(broken, {"a": (0.0, 1.0)}, samples=8))
+        == "broken: 8 samples, 8 failed, the first: no finite value"
+    )

@@ -176,6 +176,9 @@ class CodeWriter:
         helpers += [file for file, call in calls.items() if call in text]
         events = ("events.c", "impacts.c", "iteration.c") if modes else ("smooth.c",)
         nominal = array("const double", "NOMINAL", [repr(NOMINAL * state.nominal) for state in self.states])
+        chosen = {state.name for state in self.sets[0].form.states}  # only asked for membership
+        starts = [str(self.stores.index(name)) if name in chosen else "-1" for name in states]
+        nominal = f"{nominal}\n{array('const int', 'START_OF', starts)}"
         first = [runtime("head.c"), nominal, *tables, *map(runtime, helpers), text]
         last = map(runtime, ("dop853.c", "solver.c", "jumps.c", *events, "common.c"))
         return "\n".join([*first, *last, *(modes.names if modes else ()), self._init])

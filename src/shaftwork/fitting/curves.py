@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.codegen.array_form.elements import Array
-from shaftwork.core.errors import CompileError, NetworkError, SimulationError
+from shaftwork.core.errors import CompileError, ShaftworkError, SimulationError
+from shaftwork.numerics.differences import differences
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.network import Network
 from shaftwork.sensitivities.legs import DifferentiatedMotion
@@ -82,7 +83,7 @@ class ScaledCurves:
     def _computed(self, unknowns: Array) -> Array:
         try:
             return self._source.values(self._parameters(unknowns))
-        except (SimulationError, NetworkError):
+        except ShaftworkError:
             if not self._last[1].size:
                 raise
             return np.full_like(self._last[1], np.nan)
@@ -96,12 +97,8 @@ class ScaledCurves:
         if exact is not None:
             return exact * self._scale.slopes(unknowns)
         self.by_differences = True
-        step = 1e-4  # a motion is known to 1e-9 and more: so its differences are to some 1e-5
-        columns = []
-        for shift in np.eye(unknowns.size) * step:
-            high, low = (self._source.values(self._parameters(unknowns + sign * shift)) for sign in (1.0, -1.0))
-            columns.append((high - low) / (2 * step))
-        return np.array(columns).T
+        steps = np.full(unknowns.size, 1e-4)  # a motion is known to 1e-9 and more: so its differences are to some 1e-5
+        return differences(lambda at: self._source.values(self._parameters(at)), unknowns, steps)
 
 
 class RecordedMotion:

@@ -1,8 +1,9 @@
 """Estimation of unknowns by weighted least squares: values, covariance, and what the data cannot tell.
 
 Law: the unknowns minimise sum rho(r^2), r = (computed - measured) / deviation, with rho(z) = z or a robust loss. With
-the Jacobian J of r their covariance is (J^T J)^-1; of a robust loss, with w = rho'(r^2),
-(J^T W J)^-1 (J^T W r r^T W J) (J^T W J)^-1. Source: Huber and Ronchetti, Robust Statistics, 2009.
+the Jacobian J of r their covariance is (J^T J)^-1. Of a robust loss with psi = rho'(r^2) r it is
+B^-1 (J^T psi psi^T J) B^-1,
+with B = J^T J times the mean of the derivative of psi. Source: Huber and Ronchetti, Robust Statistics, 2009.
 """
 
 from __future__ import annotations
@@ -83,7 +84,7 @@ class Estimate:
         spreads: (m,) standard deviation of each combination.
         at_bounds: (m,) which unknowns ended at a bound.
         evaluations: motions computed.
-        cost: half the sum of rho.
+        message: why it is no minimum yet; empty where it is one.
     """
 
     unknowns: Array
@@ -94,7 +95,7 @@ class Estimate:
     spreads: Array
     at_bounds: NDArray[np.bool_]
     evaluations: int
-    cost: float
+    message: str
 
 
 def estimate(curves: Curves, data: Data, start: Array, bounds: tuple[Array, Array]) -> Estimate:
@@ -108,7 +109,7 @@ def estimate(curves: Curves, data: Data, start: Array, bounds: tuple[Array, Arra
         raise ParameterError(
             f"The record has {data.measured.size} values for {start.size} unknowns. Give more, or fewer unknowns."
         )
-    unknowns, evaluations = start, 0
+    unknowns, evaluations, message = start, 0, ""
     deviations = data.deviations
     residuals = curves.values(start) - data.measured
     if not np.isfinite(residuals).all():
@@ -118,6 +119,7 @@ def estimate(curves: Curves, data: Data, start: Array, bounds: tuple[Array, Arra
     for _ in range(rounds):
         result = _fitted(curves, data, weights, unknowns, bounds)
         evaluations += int(result.nfev)
+        message = "" if result.status > 0 else str(result.message).rstrip(".")
         unknowns, residuals = result.x, curves.values(result.x) - data.measured
         if deviations is not None:
             break
@@ -125,11 +127,11 @@ def estimate(curves: Curves, data: Data, start: Array, bounds: tuple[Array, Arra
         alone = weights.size == 1 and data.loss == "linear" and np.isnan(data.priors).all()
         if alone or (np.abs(weights - before) <= 1e-3 * weights).all():
             break
+    else:
+        message = message or f"the noise has not settled in {rounds} rounds"
     at_bounds = result.active_mask != 0
     covariance, directions, spreads = _spread(curves.slopes(unknowns), residuals, data, weights, at_bounds)
-    return Estimate(
-        unknowns, covariance, weights, residuals, directions, spreads, at_bounds, evaluations, float(result.cost)
-    )
+    return Estimate(unknowns, covariance, weights, residuals, directions, spreads, at_bounds, evaluations, message)
 
 
 def _noise(residuals: Array, data: Data, unknowns: int) -> Array:
@@ -182,10 +184,13 @@ def _spread(
     """Covariance, and combinations of the unknowns with their standard deviations; what is at a bound stays there."""
     free = np.flatnonzero(~fixed)
     J, away = slopes[:, free] / deviations[data.series, None], residuals / deviations[data.series]
-    weight = LOSSES[data.loss](away**2)[1]
+    _, weight, bend = LOSSES[data.loss](away**2)
+    steepness = np.bincount(data.series, weight + 2 * away**2 * bend) / data.counts
     expected = np.where(np.isnan(data.priors), 0.0, 1 / data.prior_deviations)
     apart = np.diag(expected)[:, free]
-    _, sizes, rows = np.linalg.svd(np.vstack([J * np.sqrt(weight)[:, None], apart]), full_matrices=False)
+    _, sizes, rows = np.linalg.svd(
+        np.vstack([J * np.sqrt(steepness[data.series])[:, None], apart]), full_matrices=False
+    )
     seen = sizes > EQUAL * sizes.max(initial=0.0)  # below, it is an error of the derivatives
     spreads = np.where(seen, 1 / np.where(seen, sizes, 1.0), np.inf)
     inverse = (rows[seen].T * spreads[seen] ** 2) @ rows[seen]

@@ -122,7 +122,11 @@ def _source(
     at: Mapping[str, float] | None,
 ) -> Source:
     if domain == "t":
+        if at is not None:
+            raise ParameterError("at = ... is the point of a frequency response. Of a motion give initial = {...}.")
         return recorded_motion(net, samples, names, initial, rtol)
+    if initial:
+        raise ParameterError(f"'{next(iter(initial))}' is a start value, which a frequency response has not. Give at.")
     return RecordedResponse(net.compile(), {_pair(name): f for name, f in samples.items()}, at)
 
 
@@ -232,6 +236,8 @@ def _one_series(name: str, column: Any, at: Array, domain: str) -> _Series:
     if is_quantity(column):
         raise ParameterError(f"'{name}' has a unit. Give plain numbers in SI.")
     values = np.asarray(_plain(column))
+    if domain == "t" and np.iscomplexobj(values):
+        raise ParameterError(f"'{name}' is complex: a frequency response has a column 'f' in place of 't'.")
     if values.shape != at.shape:
         raise ParameterError(f"'{name}' has {values.shape} values, and '{domain}' {at.shape}. They must be as many.")
     order = np.argsort(at, kind="stable")

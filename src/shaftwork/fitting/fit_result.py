@@ -188,6 +188,10 @@ class Fit:
             words = ", ".join(f"{name} {share:+.2f}" for name, share in shares.items())
             known = "not at all" if np.isinf(spread) else f"to {100 * spread:.0f} % only"
             notes.append(f"The record tells this combination {known}: {words}.")
+        if self.estimate.message:
+            notes.append(f"This is no minimum yet: {self.estimate.message}.")
+        if self.by_differences:
+            notes.append("Derivatives by differences.")
         held = [name for name, ends in zip(self.scaling.names, self.estimate.at_bounds.tolist(), strict=True) if ends]
         if held:
             notes.append(f"At a bound, and without an interval: {', '.join(held)}.")

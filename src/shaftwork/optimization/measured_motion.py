@@ -8,6 +8,7 @@ import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import NetworkError, SimulationError
+from shaftwork.numerics.differences import differences
 from shaftwork.pipeline.network import Network
 from shaftwork.results.measures import Measure
 from shaftwork.sensitivities.parametric_motion import ParametricMotion
@@ -53,7 +54,7 @@ class MeasuredMotion:
         return dict(zip(self._names, variables.tolist(), strict=True))
 
     def at(self, variables: Array) -> dict[str, tuple[float, Array]]:
-        """Each goal with its gradient (m,); infinite where there is no motion."""
+        """Each goal with its gradient (m,); NaN where there is no motion."""
         if self._last[0] != (key := variables.tobytes()):
             self._last = key, self._computed(variables)
         return self._last[1]
@@ -65,7 +66,7 @@ class MeasuredMotion:
             try:
                 found = self._measures(values)
             except (SimulationError, NetworkError):
-                found = {name: (np.inf, np.zeros(variables.size)) for name in self._read}
+                found = {name: (np.nan, np.zeros(variables.size)) for name in self._read}
         for name, goal in self._goals.items():
             if not isinstance(goal, str):
                 found[name] = self._of_parameters(goal, variables)
@@ -81,20 +82,14 @@ class MeasuredMotion:
             return {name: (one.of(motion.solution), self._differences(one, values)) for name, one in self._read.items()}
 
     def _differences(self, measure: Measure, values: Mapping[str, float]) -> Array:
-        shares = []
-        for name, value in values.items():
-            step = 1e-4 * (abs(value) or 1.0)  # measures are known to some 1e-9
-            high, low = (
-                measure.of(self._motion.motion({**values, name: value + sign * step}).solution) for sign in (1.0, -1.0)
-            )
-            shares.append((high - low) / (2 * step))
-        return np.array(shares)
+        at = np.array(list(values.values()))
+        steps = 1e-4 * np.where(at == 0.0, 1.0, np.abs(at))  # measures are known to some 1e-9
+        slopes = differences(lambda x: np.array([measure.of(self._motion.motion(self.values(x)).solution)]), at, steps)
+        return np.asarray(slopes[0])
 
     def _of_parameters(self, goal: Callable[[Mapping[str, float]], float], variables: Array) -> tuple[float, Array]:
-        def value(at: Array) -> float:
-            return float(goal({**self._fixed, **self.values(at)}))
+        def value(at: Array) -> Array:
+            return np.array([goal({**self._fixed, **self.values(at)})], dtype=float)
 
         steps = 1e-6 * np.where(variables == 0.0, 1.0, np.abs(variables))
-        shifts = np.diag(steps)
-        slopes = [(value(variables + shift) - value(variables - shift)) / 2 for shift in shifts]
-        return value(variables), np.array(slopes) / steps
+        return float(value(variables)[0]), differences(value, variables, steps)[0]

@@ -14,7 +14,7 @@ from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import whole
 from shaftwork.core.screen import progress
-from shaftwork.numerics.tolerances import EQUAL
+from shaftwork.numerics.tolerances import TYPED
 from shaftwork.optimization.measured_motion import Goal, MeasuredMotion
 from shaftwork.optimization.optimum import Attempt, Optimum
 from shaftwork.pipeline.arguments import checked_parameter, relative_tolerance, time_span
@@ -67,6 +67,8 @@ def optimize(
     ranges = _ranges(net, variables)
     if whole(starts) is None:
         raise ParameterError(f"starts = {starts!r} must be a whole number, 1 or more.")
+    if OBJECTIVE in (functions or {}):
+        raise ParameterError(f"'{OBJECTIVE}' is the name of the goal. Give the function another one.")
     limits = _limits(require, functions or {})
     name = goal if isinstance(goal, str) else OBJECTIVE
     goals = {name: goal, **{other: (functions or {}).get(other, other) for other in limits}}
@@ -153,11 +155,19 @@ def _attempt(
     """One descent, in shares of the ranges; goals by their sizes at the start."""
     low, high = np.array(list(ranges.values())).T
     width, before = high - low, motion.motions
-    sizes = {goal: abs(value) or 1.0 for goal, (value, _) in motion.at(start).items()}
+    first = {of: value for of, (value, _) in motion.at(start).items()}
+    if not all(map(np.isfinite, first.values())):
+        return Attempt(choice, {**fixed, **motion.values(start)}, first, "no motion at the start", motion.motions)
+    sizes = {
+        of: max(map(abs, (value, *(end or 0.0 for end in limits.get(of, ()))))) or 1.0 for of, value in first.items()
+    }
 
     def side(of: str, factor: float, level: float = 0.0) -> dict[str, Any]:
         def value(shares: Array) -> float:
-            return factor * (motion.at(low + shares * width)[of][0] - level) / sizes[of]
+            value = motion.at(low + shares * width)[of][0]
+            if np.isnan(value):  # no motion: as bad as can be, and finite for the line search
+                return 1e6 if of == name else -1e6
+            return factor * (value - level) / sizes[of]
 
         def slope(shares: Array) -> Array:
             return np.asarray(factor * motion.at(low + shares * width)[of][1] * width / sizes[of])
@@ -173,7 +183,7 @@ def _attempt(
         bounds=[(0.0, 1.0)] * len(ranges),
         constraints=[side(of, factor, level) for of, factor, level in sides if level is not None],
         method="SLSQP",
-        options={"ftol": EQUAL**1.5, "maxiter": 200},
+        options={"ftol": TYPED, "maxiter": 200},
     )
     variables = low + np.clip(found.x, 0.0, 1.0) * width
     goals = {of: value for of, (value, _) in motion.at(variables).items()}

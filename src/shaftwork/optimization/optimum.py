@@ -54,12 +54,14 @@ class Optimum:
 
     def meets(self, attempt: Attempt) -> bool:
         """Whether a design is within all limits, to a millionth of their size."""
+        if not all(map(np.isfinite, attempt.goals.values())):
+            return False
         for name, (low, high) in self.require.items():
             value = attempt.goals[name]
-            margin = 1e-6 * max(abs(value), *(abs(end) for end in (low, high) if end is not None), 0.0)
+            margin = 1e-6 * max((abs(end) for end in (low, high) if end is not None), default=0.0)
             if not (low is None or value >= low - margin) or not (high is None or value <= high + margin):
                 return False
-        return bool(np.isfinite(attempt.goals[self.goal]))
+        return True
 
     @cached_property
     def best(self) -> Attempt:

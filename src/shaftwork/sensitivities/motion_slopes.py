@@ -43,10 +43,9 @@ class DifferentiatedEquations:
         quantities: Sequence[str],
         integrands: Sequence[tuple[str, int]],
     ) -> None:
-        self.columns, self._quantities, self._integrands = (*parameters, *starts), tuple(quantities), tuple(integrands)
+        self._quantities, self._integrands = tuple(quantities), tuple(integrands)
         # a start value stands in no equation, only its state does
         self._symbols = (*(Symbol(name, real=True) for name in parameters), *(Dummy(real=True) for _ in starts))
-        self._starts = frozenset(starts)
         self._equations: dict[Model, Differentiated] = {}
 
     def __call__(self, model: Model) -> Differentiated:
@@ -64,10 +63,6 @@ class DifferentiatedEquations:
             self._equations[model] = Differentiated(model.form, rows, self._symbols, quantities, integrands)
         return self._equations[model]
 
-    def at_start(self, states: Sequence[str]) -> Array:
-        """(n, m) derivatives of states by the parameters and start values, at the start."""
-        return np.array([[float(name == state and name in self._starts) for name in self.columns] for state in states])
-
 
 class MotionSlopes:
     """The derivatives of a motion by parameters.
@@ -76,6 +71,7 @@ class MotionSlopes:
         motion: the motion.
         equations: with their derivatives by m parameters.
         parameters: (m,) their values in SI.
+        first: (n, m) derivatives of the states at the start, in the equations in which nothing is joined.
         rtol: relative tolerance of the derivatives.
 
     Raises:
@@ -85,9 +81,15 @@ class MotionSlopes:
     """
 
     def __init__(
-        self, motion: DifferentiatedMotion, equations: DifferentiatedEquations, parameters: Array, rtol: float
+        self,
+        motion: DifferentiatedMotion,
+        equations: DifferentiatedEquations,
+        parameters: Array,
+        first: Array,
+        rtol: float,
     ) -> None:
         self._motion, self.equations, self.parameters, self._rtol = motion, equations, parameters, rtol
+        self._first = first
         self.legs = tuple(part for leg in motion.legs for part in parted(leg, self.equations(leg.model)))
         self._sizes: dict[Model, Array] = {}
         self._swiftest: dict[Model, Array] = {}
@@ -119,11 +121,10 @@ class MotionSlopes:
         leg = self.legs[0]
         size, slopes = len(leg.model.states), np.zeros((self._swiftest[leg.model].size, count))
         if carrying is None or motion.start is None:
-            slopes[:size] = self.equations.at_start(leg.model.states).reshape(size, count)
+            slopes[:size] = self._first
         else:
-            loose, states = motion.start, motion.start.model.states
-            first = self.equations.at_start(states).reshape(len(states), count)
-            end = End(loose.at(loose.high)[1], leg.at(leg.low)[1], first, fixed)
+            loose = motion.start
+            end = End(loose.at(loose.high)[1], leg.at(leg.low)[1], self._first, fixed)
             slopes[:size] = carrying.over(loose, leg, [end], self._transitions(leg))[1]
         self._shifts.append(fixed)
         doubts: list[tuple[float, float]] = []

@@ -17,7 +17,7 @@ from shaftwork.results.observer import array_in_si
 from shaftwork.sensitivities.differentiation import rows_of
 from shaftwork.sensitivities.legs import DifferentiatedMotion, motion_of
 from shaftwork.sensitivities.motion_slopes import DifferentiatedEquations, MotionSlopes
-from shaftwork.sensitivities.smooth_parameters import smooth_parameters, without_start
+from shaftwork.sensitivities.smooth_parameters import smooth_parameters, start_states, without_start
 
 
 class ParametricMotion:
@@ -75,6 +75,7 @@ class ParametricMotion:
         if unknown := [name for name in quantities if name not in self.nominal.solution]:
             _ = self.nominal.solution[unknown[0]]  # raises, with what there is
         self._equations = DifferentiatedEquations(names, starts, quantities, integrands)
+        self._first = self._at_start()
 
     def motion(self, values: Mapping[str, float]) -> DifferentiatedMotion:
         """The motion for other values of parameters and start values in SI, which change no structure.
@@ -94,7 +95,17 @@ class ParametricMotion:
             SimulationError: there are none.
         """
         parameters = np.array([values.get(name, value) for name, value in self.parameters.items()])
-        return MotionSlopes(motion, self._equations, parameters, self._rtol)
+        return MotionSlopes(motion, self._equations, parameters, self._first, self._rtol)
+
+    def _at_start(self) -> Array:
+        """(n, m) derivatives of the states at the start; speeds inside a shaft follow from those of its ends."""
+        _, here = start_states(self.model, {}, self._initial, self._span)
+        slopes = np.zeros((here.size, len(self.parameters)))
+        for column, name in enumerate(self.parameters):
+            if name in self._starts:  # the states are linear in start values
+                moved = {**self._initial, name: self._initial[name] + 1.0}
+                slopes[:, column] = start_states(self.model, {}, moved, self._span)[1] - here
+        return slopes
 
 
 @dataclass(frozen=True, eq=False)

@@ -119,14 +119,14 @@ def without_start(
 def _moved(model: Model, names: Sequence[str], initial: Given, span: tuple[float, float]) -> tuple[str, ...]:
     """The states that start elsewhere where some parameters are others."""
     values = {name: model.parameters[name] for name in names}
-    states, start = _start(model, {}, initial, span)
+    states, start = start_states(model, {}, initial, span)
     shift = 1e-3  # by which part each parameter is made smaller
-    other = _start(model, {name: value * (1 - shift) for name, value in values.items()}, initial, span)[1]
+    other = start_states(model, {name: value * (1 - shift) for name, value in values.items()}, initial, span)[1]
     far = np.abs(other - start) > TYPED * shift * np.abs(start).max(initial=0.0)
     return tuple(name for name, moves in zip(states, far.tolist(), strict=True) if moves)
 
 
-def _start(
+def start_states(
     model: Model, values: Mapping[str, float], initial: Given, span: tuple[float, float]
 ) -> tuple[tuple[str, ...], Array]:
     """The states by name, and where they start, in the equations in which nothing is joined."""

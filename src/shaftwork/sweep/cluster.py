@@ -30,7 +30,7 @@ def on_cluster(task: Task, parts: Sequence[Index], client: Any) -> Iterator[Chun
     distributed = imported("distributed", "cluster", "sweep(on=...)")
     if not isinstance(client, distributed.Client):
         raise ParameterError(f"on = {client!r} must be a client of Dask: distributed.Client(...).")
-    calls = _Calls(task, parts, client, distributed.as_completed())
+    calls = _Calls(task, parts, client, distributed.as_completed(loop=client.loop))
     lost = distributed.KilledWorker, distributed.client.FutureCancelledError
     try:
         calls.submit()

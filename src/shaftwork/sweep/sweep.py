@@ -85,11 +85,11 @@ def sweep(
         t_eval: output times of the solutions that functions get, as there; names measure the motion, not the outputs.
         processes: how many; by default as many as there are cores, where the sweep takes long enough.
         on: a client of Dask, `distributed.Client(...)`, whose workers do all of it (extra `cluster`).
-        store: a file to which all that is done is appended. The same call with the same file goes on where it stopped.
+        store: a file to which all that is done is written. The same call with the same file goes on where it stopped.
 
     Raises:
         ParameterError: an argument is out of its range, there is no such parameter or measure, or the store is that of
-            another sweep, in use by one, damaged in a line that is not the last, or cannot be written any more.
+            another sweep, in use by one, damaged, or cannot be written any more.
         NetworkError: the network cannot be assembled.
         SignalError: a measure is of a quantity that does not exist.
     """

@@ -132,6 +132,6 @@ def bands(
 def _columns(distributions: Mapping[str, Distribution], samples: int | None, seed: int) -> Mapping[str, Array]:
     if samples is None and len(distributions) == 1:
         ((name, values),) = distributions.items()
-        if isinstance(values, Sequence) and not isinstance(values, str | tuple):
+        if isinstance(values, Sequence | np.ndarray) and not isinstance(values, str | tuple):
             return {str(name): np.asarray(values, dtype=float)}
     return Design(distributions, "random", 100 if samples is None else samples, seed).columns

@@ -28,7 +28,8 @@ def quantiles(name: str, distribution: Distribution, shares: Array, ends: tuple[
     if hasattr(distribution, "ppf"):
         # a grid of shares goes to the ends, which some distributions do not have
         inside = shares if np.isfinite(distribution.ppf([0.0, 1.0])).all() else np.clip(shares, *ends)
-        return np.asarray(distribution.ppf(inside), dtype=float)
+        values = np.asarray(distribution.ppf(inside), dtype=float)
+        return np.clip(values, *distribution.support()) if hasattr(distribution, "support") else values
     if isinstance(distribution, tuple):
         if len(distribution) == 2 and distribution[0] < distribution[1]:
             return np.asarray(distribution[0] + shares * (distribution[1] - distribution[0]))
@@ -84,7 +85,8 @@ class Design:
             return np.random.default_rng(self.seed).random((self.count, len(self.names)))
         sampler = imported(f"SALib.sample.{self.method}", "uncertainty", f"uncertainty(method='{self.method}')")
         options = {"calc_second_order": False} if self.method == "sobol" else {}
-        return np.asarray(sampler.sample(self.problem, self.count, seed=self.seed, **options))
+        # SALib takes a seed of 0 for none
+        return np.asarray(sampler.sample(self.problem, self.count, seed=1 + self.seed, **options))
 
     @property
     def independent(self) -> NDArray[np.intp]:
@@ -100,7 +102,9 @@ class Design:
         """SALib's analysis of a measure (rows,)."""
         analysis = imported(f"SALib.analyze.{self.method}", "uncertainty", "Uncertainty.indices()")
         if self.method == "sobol":
-            found = analysis.analyze(self.problem, values, calc_second_order=False, conf_level=level, seed=self.seed)
+            found = analysis.analyze(
+                self.problem, values, calc_second_order=False, conf_level=level, seed=1 + self.seed
+            )
             return {name: np.asarray(found[name]) for name in ("S1", "S1_conf", "ST", "ST_conf")}
-        found = analysis.analyze(self.problem, self.shares, values, conf_level=level, seed=self.seed)
+        found = analysis.analyze(self.problem, self.shares, values, conf_level=level, seed=1 + self.seed)
         return {name: np.asarray(found[name], dtype=float) for name in ("mu", "mu_star", "mu_star_conf", "sigma")}

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
 from shaftwork.core.errors import ParameterError
@@ -85,8 +84,9 @@ class Uncertainty:
     def probability(self, measure: str, *, above: float | None = None, below: float | None = None) -> Probability:
         """How probable it is that a measure passes a limit.
 
-        Law: the share of the independent samples that do, with the interval of Clopper and Pearson. Samples that failed
-        count as passing: nothing is known of them.
+        Law: the share of the samples that do, with the interval of Clopper and Pearson for independent ones; of Sobol'
+        points it is as a rule too wide. Nothing is known of samples that failed: the value and the upper end count them
+        as passing, the lower end as not.
 
         Args:
             measure: its name.
@@ -101,11 +101,14 @@ class Uncertainty:
         self.values(measure)
         rows = self.design.independent
         values = self._column(measure)[rows]
-        passing: NDArray[np.bool_] = self.sweep.failed[rows].copy()
-        passing |= np.zeros(rows.size, dtype=bool) if above is None else values > above
-        passing |= np.zeros(rows.size, dtype=bool) if below is None else values < below
-        interval = stats.binomtest(int(passing.sum()), rows.size).proportion_ci(self.level)
-        return Probability(float(passing.mean()), float(interval.low), float(interval.high))
+        passing = np.zeros(rows.size, dtype=bool)
+        passing |= False if above is None else values > above
+        passing |= False if below is None else values < below
+        most = int((passing | self.sweep.failed[rows]).sum())
+        low, high = (
+            stats.binomtest(count, rows.size).proportion_ci(self.level) for count in (int(passing.sum()), most)
+        )
+        return Probability(most / rows.size, float(low.low), float(high.high))
 
     def indices(self, measure: str) -> dict[str, dict[str, tuple[float, float]]]:
         """Where the uncertainty of a measure comes from: by index and parameter, the value and half its interval.
@@ -136,7 +139,7 @@ class Uncertainty:
 
     def _rows(self) -> list[list[str]]:
         """Cells of the table of distributions."""
-        if self.design.method == "morris":
+        if self.design.method == "morris" or self.sweep.failed.all():
             return []
         rows = [["", "mean", "+-", "deviation", "2.5 %", "50 %", "97.5 %"]]
         for measure in self.measures:
@@ -161,7 +164,8 @@ class Uncertainty:
     @property
     def _title(self) -> str:
         failed = int(self.sweep.failed.sum())
-        return f"{self.sweep.name}: {counted(len(self), 'sample')}, {failed} failed"
+        first = next((f", the first: {reason}" for reason in self.sweep.reasons if reason), "")
+        return f"{self.sweep.name}: {counted(len(self), 'sample')}, {failed} failed{first}"
 
     def __str__(self) -> str:
         lines = [self._title]

@@ -38,7 +38,8 @@ enum {
     NAME_STEP_TOO_SMALL = -1,
     NAME_TOO_MANY_EVENTS = -2,
     NAME_NO_CONSISTENT_MODES = -3,
-    NAME_TOO_MANY_STEPS = -4
+    NAME_TOO_MANY_STEPS = -4,
+    NAME_CONTRADICTORY_START = -5
 };
 
 typedef struct NAME {
@@ -46,7 +47,7 @@ typedef struct NAME {
     double x[NAME_STATES + 1];           /* states */
     double p[NAME_PARAMETERS + 1];       /* parameters */
     double u[NAME_INPUTS + 1];           /* inputs */
-    double start[NAME_STORES + 1];       /* start values of all that is stored */
+    double start[NAME_STORES + 1];       /* start values of all that is stored; 0 of what follows from others */
     double number[NAME_MACHINES + 1];    /* of each mode in laws; follows from the modes */
     int mode[NAME_MACHINES + 1];         /* of each part, see NAME_mode_name */
     int set;                             /* of equations; follows from the modes */

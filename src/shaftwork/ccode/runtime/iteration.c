@@ -251,9 +251,8 @@ int NAME_start(NAME *m, double t)
     m->met = -1;
     pass(m, t);
     put_modes(m, mode);
-    for (int i = 0; i < NX; i++) m->x[i] = 0.0;
     for (int i = 0; i < NG; i++) m->clear[i] = 0.0;
-    take_up(m, inside(m, t), m->start, m->x);
+    if (begin(m)) return m->fault;
     for (int i = 0; i < NAME_STATES; i++) {
         double stored[NS];
         stores(m, inside(m, t), m->x, stored);

@@ -12,6 +12,23 @@ static int sample(NAME *m)
     return changed;
 }
 
+/* The states at the start; what gears and the like tie to them follows, and may be given as it follows alone. */
+static int begin(NAME *m)
+{
+    double stored[NS];
+    const double t = inside(m, m->t);
+    for (int i = 0; i < NX; i++) m->x[i] = 0.0;
+    for (int i = 0; i < NAME_STATES; i++)
+        if (START_OF[i] >= 0) m->x[i] = m->start[START_OF[i]];
+    stores(m, t, m->x, stored);
+    for (int k = 0; k < NAME_STORES; k++) {
+        const double given = m->start[k], size = fmax(fabs(given), fabs(stored[k]));
+        if (given < 0.0 || given > 0.0)
+            if (!(fabs(given - stored[k]) <= 1e-9 * size)) return m->fault = NAME_CONTRADICTORY_START;
+    }
+    return 0;
+}
+
 /* What is stored goes on beyond an instant at which sources jump. */
 static int jump(NAME *m)
 {

@@ -15,7 +15,7 @@ int NAME_start(NAME *m, double t)
     m->fault = 0;
     m->met = -1;
     pass(m, t);
-    take_up(m, inside(m, t), m->start, m->x);
+    if (begin(m)) return m->fault;
     (void)sample(m);
     return 0;
 }
