@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from typing import Any
 
@@ -59,3 +60,28 @@ def test_many_steps_of_a_loop_are_one_run(sample_time: float | None) -> None:
         speeds.append(run["J2.omega"])
     whole = model.simulate(1.0, t_eval=101, rtol=1e-11)["J2.omega"][1:]
     assert np.abs(np.array(speeds) - whole).max() < 1e-9 * np.abs(whole).max()
+
+
+@pytest.mark.parametrize("friction", [0.0, 2.0])
+def test_a_reference_that_is_set_from_outside_is_what_a_sampled_controller_takes(friction: float) -> None:
+    """It is set before the first sample, and once again between two of them."""
+
+    def net(reference: object) -> sw.Network:
+        net = loop(0.05)
+        net.replace(net_part(net, reference))
+        if friction:
+            net.add(sw.CoulombLoad("friction", tau=friction), "b")
+        return net
+
+    run = net(0.0).compile().start(inputs=["pi.reference"], rtol=1e-11)
+    for k in range(50):
+        run.set("pi.reference", 100.0 if k < 26 else 40.0)
+        run.step(0.02)
+    wanted = net(sw.Table([0.0, 0.51999, 0.52, 1.0], [100.0, 100.0, 40.0, 40.0])(sw.t)).simulate(1.0, rtol=1e-11)
+    assert run["J2.omega"] == pytest.approx(wanted["J2.omega"][-1], rel=1e-8)
+
+
+def net_part(net: sw.Network, reference: object) -> sw.Component:
+    """The controller with another reference."""
+    part = next(placed.part for placed in net.netlist().placed if placed.part.name == "pi")
+    return dataclasses.replace(part, reference=reference)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,17 +49,25 @@ class SampledSteps:
 
     Args:
         form: the state form.
-        bind: makes the array program with the parameters of the run.
+        values: of the parameters of the run.
+        bind: makes the array program with them.
         instants: at which inputs jump.
         span: start and end of the run, s.
     """
 
     def __init__(
-        self, form: StateForm, bind: Callable[[], BoundArrays], instants: Timeline, span: tuple[float, float]
+        self,
+        form: StateForm,
+        values: Mapping[str, float],
+        bind: Callable[[], BoundArrays],
+        instants: Timeline,
+        span: tuple[float, float],
     ) -> None:
         self._places = {state.name: k for k, state in enumerate(form.states)}
         samplers = ((part, part.component.sampler()) for part in form.graph.parts)
-        self._parts = tuple(_placed(part, sampler, self._places) for part, sampler in samplers if sampler is not None)
+        self._parts = tuple(
+            _placed(part, sampler, self._places, values) for part, sampler in samplers if sampler is not None
+        )
         self._instants, self._observer = instants, ModelObserver(form, bind, instants)
         self._clearance = CLEARANCE * math.ulp(max(map(abs, span)))
 
@@ -86,8 +94,9 @@ class SampledSteps:
         return float(self._observer.signal(name, np.array([t]), x[None])[0])
 
 
-def _placed(part: GraphPart, sampler: Sampler, places: dict[str, int]) -> _SampledPart:
-    law = vectorised((TIME,), as_expression(sampler.reference))
+def _placed(part: GraphPart, sampler: Sampler, places: dict[str, int], values: Mapping[str, float]) -> _SampledPart:
+    # a number may have been set from outside since the part was made
+    law = vectorised((TIME,), as_expression(values.get(f"{part.name}.reference", sampler.reference)))
     states, outputs = (
         [places[f"{part.name}.{letter}_{k}"] for k in range(1, count + 1)]
         for letter, count in (("x", len(sampler.A)), ("x_u", len(sampler.C)))

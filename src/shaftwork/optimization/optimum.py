@@ -105,6 +105,7 @@ class Optimum:
         rows = [[name, f"{value:.6g}", ""] for name, value in best.values.items()]
         rows += [[name, f"{value:.6g}", self._said(name)] for name, value in best.goals.items()]
         rows += [[name, f"number {number}", "chosen"] for name, number in best.choice.items()]
+        rows += [] if "success" in best.message else [["no minimum yet", "", best.message]]
         return title, ["", "best", ""], rows
 
     def _said(self, name: str) -> str:

@@ -117,7 +117,10 @@ class Prepared:
             return None
         from shaftwork.control.sampled_steps import SampledSteps
 
-        return self._sampled(span, lambda: SampledSteps(self.form, lambda: self.bound, self.instants(span), span))
+        values = dict(zip(self.form.graph.parameters, self.p.tolist(), strict=True))
+        return self._sampled(
+            span, lambda: SampledSteps(self.form, values, lambda: self.bound, self.instants(span), span)
+        )
 
     @cached_property
     def _sampled(self) -> BoundedCache[tuple[float, float], Callable[[float, Array], Array]]:

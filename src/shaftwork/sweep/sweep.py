@@ -139,7 +139,7 @@ def _run(task: Task, processes: int | None, on: Any, path: str | Path | None) ->
 
     def take(chunk: Chunk) -> None:
         nonlocal alone, failed
-        new = open_[chunk.variants]  # two calls at once on one store have done some twice
+        new = open_[chunk.variants]  # a store may hold some twice
         alone += min(chunk.left, int(new.sum()))
         failed += sum(bool(reason) for reason in compress(chunk.reasons, new))
         values[chunk.variants], open_[chunk.variants] = chunk.values, False
@@ -155,8 +155,8 @@ def _run(task: Task, processes: int | None, on: Any, path: str | Path | None) ->
                     store.append(chunk)
                 take(chunk)
                 show(len(task) - int(open_.sum()), f"{failed} failed" if failed else "sweep")
-    why = worker.why or (f"{alone} of {len(task)} variants ran one by one: {LEFT}" if alone else "")
-    return values, tuple(reasons), why
+    said = f"{alone} of {len(task)} variants ran one by one: {LEFT}" if alone else ""
+    return values, tuple(reasons), worker.why or said
 
 
 def _chunks(worker: Worker, task: Task, variants: Index, processes: int | None, on: Any) -> Iterator[Chunk]:

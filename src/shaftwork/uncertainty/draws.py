@@ -98,13 +98,14 @@ class Design:
             )
         return np.arange(self.count if self.method == "random" else 0)
 
-    def indices(self, values: Array, level: float) -> dict[str, Array]:
-        """SALib's analysis of a measure (rows,)."""
+    def indices(self, values: Array, level: float) -> dict[str, tuple[Array, Array]]:
+        """SALib's analysis of a measure (rows,): each index with half of its interval."""
         analysis = imported(f"SALib.analyze.{self.method}", "uncertainty", "Uncertainty.indices()")
         if self.method == "sobol":
             found = analysis.analyze(
                 self.problem, values, calc_second_order=False, conf_level=level, seed=1 + self.seed
             )
-            return {name: np.asarray(found[name]) for name in ("S1", "S1_conf", "ST", "ST_conf")}
+            return {name: (np.asarray(found[name]), np.asarray(found[f"{name}_conf"])) for name in ("S1", "ST")}
         found = analysis.analyze(self.problem, self.shares, values, conf_level=level, seed=1 + self.seed)
-        return {name: np.asarray(found[name], dtype=float) for name in ("mu", "mu_star", "mu_star_conf", "sigma")}
+        size, spread = np.asarray(found["mu_star"], dtype=float), np.asarray(found["sigma"], dtype=float)
+        return {"mu*": (size, np.asarray(found["mu_star_conf"], dtype=float)), "sigma": (spread, np.zeros_like(spread))}

@@ -126,15 +126,9 @@ class Uncertainty:
                 f"{counted(failed, 'sample')} of {len(self)} failed, and indices need all of them; see sweep.reasons."
             )
         found = self.design.indices(column, self.level)
-        nothing = np.zeros(len(self.design.names))
-        pairs = (
-            {"S1": (found["S1"], found["S1_conf"]), "ST": (found["ST"], found["ST_conf"])}
-            if self.design.method == "sobol"
-            else {"mu*": (found["mu_star"], found["mu_star_conf"]), "sigma": (found["sigma"], nothing)}
-        )
         return {
             index: dict(zip(self.design.names, zip(value.tolist(), half.tolist(), strict=True), strict=True))
-            for index, (value, half) in pairs.items()
+            for index, (value, half) in found.items()
         }
 
     def _rows(self) -> list[list[str]]:
