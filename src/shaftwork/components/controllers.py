@@ -257,7 +257,7 @@ class StateSpaceController(Controller):
     Law: x' = A x + B e, u = C x + D e, with e = reference + setpoints - measured; the reference is that of the first
     measured quantity. With a sample time T it is x(k+1) = A x(k) + B e(k), u(k) = C x(k) + D e(k), and u is held until
     the next instant: the first is the start of the motion where that is a multiple of T. So a gain K of LQR, u = -K y,
-    is D = K, and a PI controller has A = 0, B = 1, C = k_i, D = k_p.
+    is D = K, and a PI controller has A = 0, B = 1, C = k_i, D = k_p, a sampled one A = 1, B = T instead.
 
     It measures speeds and voltages of parts and nodes, and what springs and inductors let through: `shaft.tau_c`. To
     measure an angle, let a state integrate the speed. Each output goes to a node of its own, as a torque, force,
@@ -278,7 +278,7 @@ class StateSpaceController(Controller):
         if missing := [names for names, gains in needed.items() if gains is None]:
             raise ParameterError(
                 f"StateSpaceController '{self.name}': {missing[0]} must be given, else it does nothing. A gain alone "
-                "is D = [[2.0]]; a PI controller has A = 0, B = 1, C = k_i, D = k_p."
+                "is D = [[2.0]]; a continuous PI controller has A = 0, B = 1, C = k_i, D = k_p."
             )
         sized = ((self.A, (n, n)), (self.B, (n, k)), (self.C, (m, n)), (self.D, (m, k)))
         A, B, C, D = (
