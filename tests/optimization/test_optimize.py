@@ -114,6 +114,7 @@ def test_where_no_design_meets_the_limits_the_error_says_how_near_they_came() ->
         ({"goal": "damage JL.omega"}, "no derivative"),
         ({"starts": 0}, "starts = 0"),
         ({"require": {"end JL.omega": 3.0}}, "must be within"),
+        ({"require": {"end JL.omega": ("a", None)}}, "a limit of 'end JL.omega'"),
         ({"functions": {"size": len}}, "a function without limits"),
         ({"choices": {"motor": []}}, "nothing to choose"),
     ],

@@ -11,7 +11,7 @@ import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.parameters import Parameter, is_quantity
+from shaftwork.core.parameters import Parameter, in_si, is_quantity
 from shaftwork.fitting.curves import RecordedResponse, ScaledCurves, Scaling, Source, recorded_motion
 from shaftwork.fitting.estimation import LOSSES, Data, estimate
 from shaftwork.fitting.fit_result import AT_START, Fit
@@ -189,7 +189,8 @@ def _range(netlist: Netlist, model: Model, name: str, span: Any) -> Range:
     if not (isinstance(span, Sequence) and not isinstance(span, str) and len(span) == 2):
         raise ParameterError(f"'{name}': {span!r} is no range. Give (low, high); None leaves a side open.")
     low, high = (
-        end if end is None else float(end) if is_start else checked_parameter(netlist, name, end) for end in span
+        end if end is None else in_si(name, end, "1") if is_start else checked_parameter(netlist, name, end)
+        for end in span
     )
     if low is not None and high is not None and low >= high:
         raise ParameterError(f"'{name}': ({low:g}, {high:g}) is no range. The first must be less than the second.")
@@ -241,7 +242,10 @@ def _one_series(name: str, column: Any, at: Array, domain: str) -> _Series:
     if values.shape != at.shape:
         raise ParameterError(f"'{name}' has {values.shape} values, and '{domain}' {at.shape}. They must be as many.")
     order = np.argsort(at, kind="stable")
-    ordered = values[order].astype(float if domain == "t" else complex)
+    try:
+        ordered = values[order].astype(float if domain == "t" else complex)
+    except (TypeError, ValueError):
+        raise ParameterError(f"'{name}' holds something else than numbers: {reprlib.repr(column)}.") from None
     there = np.isfinite(ordered)
     if not there.any():
         raise ParameterError(f"'{name}' has no finite value.")
@@ -271,16 +275,16 @@ def _deviations(sigma: Any, names: Sequence[str]) -> Array | None:
             f"sigma has no value for '{missing[0]}'. Give one for each quantity of the record, or none."
         )
     values = [sigma[name] if isinstance(sigma, Mapping) else sigma for name in names]
-    deviations = np.array(values, dtype=float)
-    if not (np.isfinite(deviations).all() and (deviations > 0).all()):
-        raise ParameterError(f"sigma = {sigma!r} must be positive: the standard deviation of the noise, in SI.")
-    return deviations
+    return np.array([in_si("sigma", value, "1", above=0) for value in values])
 
 
 def _priors(priors: Mapping[str, tuple[float, float]] | None, scale: Scaling) -> tuple[Array, Array]:
     """(m,) values expected of the scaled unknowns, and their standard deviations; NaN where nothing is."""
     values, deviations = np.full((2, len(scale.names)), np.nan)
-    for name, (value, deviation) in (priors or {}).items():
+    for name, prior in (priors or {}).items():
+        if not (isinstance(prior, Sequence) and not isinstance(prior, str) and len(prior) == 2):
+            raise ParameterError(f"The prior of '{name}' must be (value, standard deviation), not {prior!r}.")
+        value, deviation = (in_si(f"the prior of '{name}'", one, "1") for one in prior)
         if name not in scale.names:
             raise ParameterError(f"'{name}' has a prior and is not unknown. Unknown are: {', '.join(scale.names)}.")
         place = scale.names.index(name)

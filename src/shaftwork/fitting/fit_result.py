@@ -127,10 +127,18 @@ class Fit:
     @cached_property
     def residuals(self) -> dict[str, Array]:
         """(k,) by quantity, computed less measured; of a response complex."""
-        parts = {name: self.estimate.residuals[self.data.series == number] for number, name in enumerate(self.samples)}
+        return self._by_quantity(self.estimate.residuals)
+
+    @property
+    def measured(self) -> dict[str, Array]:
+        """(k,) by quantity, as recorded."""
+        return self._by_quantity(self.data.measured)
+
+    def _by_quantity(self, values: Array) -> dict[str, Array]:
+        parts = {name: values[self.data.series == number] for number, name in enumerate(self.samples)}
         if self.domain == "t":
             return parts
-        return {name: values[: len(values) // 2] + 1j * values[len(values) // 2 :] for name, values in parts.items()}
+        return {name: part[: len(part) // 2] + 1j * part[len(part) // 2 :] for name, part in parts.items()}
 
     @property
     def correlation(self) -> dict[str, float]:
@@ -140,14 +148,6 @@ class Fit:
             power = float((np.abs(values) ** 2).sum())
             found[name] = float((values[1:] * values[:-1].conj()).sum().real) / power if power else 0.0
         return found
-
-    @property
-    def measured(self) -> dict[str, Array]:
-        """(k,) by quantity, as recorded."""
-        parts = {name: self.data.measured[self.data.series == number] for number, name in enumerate(self.samples)}
-        if self.domain == "t":
-            return parts
-        return {name: values[: len(values) // 2] + 1j * values[len(values) // 2 :] for name, values in parts.items()}
 
     def plot(self) -> Figure:
         """What was measured and computed, and below it the residuals (extra `plot`).

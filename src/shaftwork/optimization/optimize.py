@@ -12,7 +12,7 @@ from scipy.stats import qmc
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.parameters import whole
+from shaftwork.core.parameters import in_si, whole
 from shaftwork.core.screen import progress
 from shaftwork.numerics.tolerances import TYPED
 from shaftwork.optimization.measured_motion import Goal, MeasuredMotion
@@ -111,6 +111,9 @@ def _limits(require: Mapping[str, Limits] | None, functions: Mapping[str, Goal])
     for name, span in limits.items():
         if not (isinstance(span, Sequence) and not isinstance(span, str) and len(span) == 2):
             raise ParameterError(f"'{name}' must be within (low, high), None leaves a side open; not {span!r}.")
+        for end in span:
+            if end is not None:
+                in_si(f"a limit of '{name}'", end, "1")
     if unused := [name for name in functions if name not in limits]:
         raise ParameterError(
             f"'{unused[0]}' is a function without limits. Give require={{'{unused[0]}': (low, high)}}."
