@@ -80,8 +80,7 @@ def flat_text(form: StateForm, start: Mapping[str, float], t_end: float, turned:
         raise CompileError(
             f"'{graph.name}' has no explicit equations in symbols: laws determine each other. {_COMPONENT_FORM}"
         ) from None
-    lines = list(_Flat(form, rows, start, turned).lines(t_end))
-    name = Identifiers()[graph.name]
+    lines, name = list(_Flat(form, rows, start, turned).lines(t_end)), Identifiers()[graph.name]
     head = "  // Written by Shaftwork, in SI units: parameters, states, quantities; then the rates of the states"
     text = "\n".join([f"model {name} {quoted(graph.name)}", head, *lines, f"end {name};", ""])
     return text.replace("\n", f"\n{functions_in(text)}", 1)
