@@ -80,14 +80,14 @@ class MachineProgram:
         in_loops = {row for loop in loops for row in range(loop.first, loop.first + loop.count)}
         single = {row: rate for row, rate in enumerate(rows.rates) if row not in in_loops}
         reads = {symbol for loop in loops for symbol, _ in read_by(loop.rate)}
-        jumping = _switches(rows)
-        watched = dict(enumerate((*guards, *jumping)))
+        jumps = jumping(rows.states, rows.rates)
+        watched = dict(enumerate((*guards, *jumps)))
         expressions = (*single.values(), *(loop.rate for loop in loops), *watched.values())
         self._fixed = fixed = Fixed(rows.parameters, (*rows.states, *reads, TIME), expressions)
         places |= {part: ("p", len(rows.parameters) + k) for part, k in fixed.places.items()}
 
         def write(body: Body, values: Mapping[int, Expr], loops: Sequence[Stencil] = ()) -> None:
-            terms = _Terms(body, fixed, places)
+            terms = Terms(body, fixed, places)
             for place, value in values.items():
                 body.write(place, terms.value(value))
             for loop in loops:
@@ -95,7 +95,7 @@ class MachineProgram:
 
         try:
             rates = machine_function(partial(write, values=single, loops=loops))
-            self._code = rates, machine_function(partial(write, values=watched)), len(guards), len(jumping)
+            self._code = rates, machine_function(partial(write, values=watched)), len(guards), len(jumps)
         except NumbaError as error:
             raise CompileError(f"'{title}' has a law that numba cannot compile: {error}") from error
 
@@ -107,10 +107,10 @@ class MachineProgram:
         return np.concatenate([p, self._fixed.values(p)])
 
 
-def _switches(rows: Rows) -> tuple[Expr, ...]:
+def jumping(states: Sequence[Symbol], rates: Sequence[Expr]) -> tuple[Expr, ...]:
     """What makes a rate jump, bend or rise steeply where its sign changes with the motion."""
-    moving, levels = frozenset(rows.states), dict[tuple[Expr, float], None]()
-    for rate in rows.rates:
+    moving, levels = frozenset(states), dict[tuple[Expr, float], None]()
+    for rate in rates:
         nodes = sympy.preorder_traversal(rate)
         places = [
             *chain.from_iterable(map(switches_of, nodes)),
@@ -123,7 +123,7 @@ def _switches(rows: Rows) -> tuple[Expr, ...]:
     return tuple(argument - level if level else argument for argument, level in levels)
 
 
-class _Terms:
+class Terms:
     """Writes expressions as machine code, equal ones once.
 
     Args:
@@ -146,6 +146,10 @@ class _Terms:
             self._known |= {symbol: self._body.read("x", distance, row) for symbol, distance in reads}
             self._body.write(0, self.value(loop.rate), row)
         self._known = outside
+
+    def define(self, symbol: Symbol, value: Expr) -> None:
+        """Let a symbol stand for an expression."""
+        self._known[symbol] = self.value(value)
 
     def value(self, node: Basic) -> Any:
         """A number.
@@ -251,14 +255,14 @@ class _Terms:
         raise CompileError(f"There is no machine code of the condition {node}.")
 
 
-SHAPES: dict[Any, Callable[[_Terms, Any], Any]] = {
-    sympy.Add: _Terms.sum,
-    sympy.Mul: _Terms.product,
-    sympy.Pow: _Terms.power,
-    sympy.Max: _Terms.extreme,
-    sympy.Min: _Terms.extreme,
-    sympy.sign: _Terms.step,
-    sympy.Heaviside: _Terms.step,
-    sympy.Piecewise: _Terms.pieces,
+SHAPES: dict[Any, Callable[[Terms, Any], Any]] = {
+    sympy.Add: Terms.sum,
+    sympy.Mul: Terms.product,
+    sympy.Pow: Terms.power,
+    sympy.Max: Terms.extreme,
+    sympy.Min: Terms.extreme,
+    sympy.sign: Terms.step,
+    sympy.Heaviside: Terms.step,
+    sympy.Piecewise: Terms.pieces,
 }
 """What is written of several instructions."""

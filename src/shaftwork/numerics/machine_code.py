@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Literal
 
@@ -18,6 +18,8 @@ VECTOR, MATRIX = types.Array(types.float64, 1, "C"), types.Array(types.float64, 
 CONSTANT = types.Array(types.float64, 1, "C", readonly=True)
 SYSTEM = (types.float64, VECTOR, VECTOR, VECTOR)
 """What a system takes: t in s, x (n,), p (parameters,) and an array that it writes."""
+LANES = 8
+"""Systems side by side in one call: as many numbers as a processor adds at once, or a few times as many."""
 
 _quantile = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double, ctypes.c_int)(
     get_cython_function_address("scipy.special.cython_special", "ndtri")
@@ -85,6 +87,93 @@ class Body:
         code = context.get_function(kind, kind.get_call_type(context.typing_context, arguments, {}))
         context.add_linking_libs(getattr(code, "libs", ()))
         return code(self.builder, values)
+
+
+class LaneBody(Body):
+    """The machine code of a function of many systems side by side, whose numbers stand in rows of `LANES`.
+
+    Args:
+        context: numba's.
+        builder: llvmlite's.
+        arguments: of the function: the address of the first row, and the number of the row that it writes first.
+        rows: the first row of each array.
+    """
+
+    _kind = ir.VectorType(ir.DoubleType(), LANES)
+
+    def __init__(self, context: Any, builder: Any, arguments: Sequence[Any], rows: Mapping[str, int]) -> None:
+        self._context, self.builder, self._rows = context, builder, rows
+        self._memory = builder.inttoptr(arguments[0], self._kind.as_pointer())
+        self._written = builder.gep(self._memory, [arguments[1]])
+        self.t = self.read("moment", 0)
+
+    def number(self, value: float) -> Any:
+        return ir.Constant(self._kind, [value] * LANES)
+
+    def bit(self, *, value: bool) -> Any:
+        return ir.Constant(ir.VectorType(ir.IntType(1), LANES), [value] * LANES)
+
+    def _at(self, first: Any, place: int, row: Any) -> Any:
+        number = ir.Constant(ir.IntType(64), place)
+        return self.builder.gep(first, [number if row is None else self.builder.add(row, number)])
+
+    def read(self, array: str, place: int, row: Any = None) -> Any:
+        return self.builder.load(self._at(self._memory, self._rows[array] + place, row), align=8)
+
+    def write(self, place: int, value: Any, row: Any = None) -> None:
+        self.builder.store(value, self._at(self._written, place, row), align=8)
+
+    def put(self, array: str, place: int, value: Any, row: Any = None) -> None:
+        """Write numbers of an array of which this is not the one that the function writes."""
+        self.builder.store(value, self._at(self._memory, self._rows[array] + place, row), align=8)
+
+    def intrinsic(self, name: str, *values: Any) -> Any:
+        title, kind = f"llvm.{name}.v{LANES}f64", ir.FunctionType(self._kind, [self._kind] * len(values))
+        return self.builder.call(cgutils.get_or_insert_function(self.builder.module, kind, title), values)
+
+    def call(self, function: Any, *values: Any) -> Any:
+        result = self.number(0.0)
+        for lane in range(LANES):
+            number = ir.Constant(ir.IntType(32), lane)
+            one = [self.builder.extract_element(v, number) if v.type == self._kind else v for v in values]
+            result = self.builder.insert_element(result, super().call(function, *one), number)
+        return result
+
+    def run(self, address: int, row: int) -> None:
+        """Run another function of this memory, which writes from a row on."""
+        whole = ir.IntType(64)
+        kind = ir.FunctionType(ir.VoidType(), [whole, whole]).as_pointer()
+        function = self.builder.inttoptr(ir.Constant(whole, address), kind)
+        memory = self.builder.ptrtoint(self._memory, whole)
+        self.builder.call(function, [memory, ir.Constant(whole, row)])
+
+
+def lane_function(write: Callable[[LaneBody], None], rows: Mapping[str, int]) -> Any:
+    """A function of the memory of a block of lanes and a number of a row, from what writes it; see `LaneBody`."""
+
+    @_written
+    def body(_typing, memory, row):  # type: ignore[no-untyped-def]
+        def lowered(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+            write(LaneBody(context, builder, arguments, rows))
+            return context.get_dummy_value()
+
+        return types.void(memory, row), lowered
+
+    return cfunc(types.void(types.int64, types.int64))(lambda memory, row: body(memory, row))  # noqa: PLW0108
+
+
+@_written
+def run_at(_typing, address, memory, row):  # type: ignore[no-untyped-def]
+    """Call a `lane_function` by its address, with an array as memory and the number of the row that it writes first."""
+
+    def lowered(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        whole = ir.IntType(64)
+        function = builder.inttoptr(arguments[0], ir.FunctionType(ir.VoidType(), [whole, whole]).as_pointer())
+        data = context.make_array(signature.args[1])(context, builder, value=arguments[1]).data
+        builder.call(function, [builder.ptrtoint(data, whole), arguments[2]])
+        return context.get_dummy_value()
+
+    return types.void(address, memory, row), lowered
 
 
 def machine_function(write: Callable[[Body], None]) -> Any:

@@ -4,35 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import IntEnum
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from sympy import Expr, Symbol
+from numpy.typing import NDArray
+from sympy import Expr
 
-from shaftwork.codegen.array_form.elements import Array
+from shaftwork.codegen.array_form.elements import Array, Index
 from shaftwork.codegen.state_transfer import StateTransfer
-from shaftwork.codegen.taylor.heyoka_expressions import Translator
-from shaftwork.components.laws import t as TIME
+from shaftwork.codegen.timeline import Timeline
 from shaftwork.core.errors import CompileError
-from shaftwork.formulation.explicit_rows import Rows
 from shaftwork.formulation.observables import Observables
 from shaftwork.pipeline.model import Model
-from shaftwork.results.measures import EXTREMES, POWERS, Measure
-from shaftwork.sweep.lane_step import LaneProgram, LaneStep, lane_function, lane_program
-from shaftwork.sweep.lane_steps import Index, Mask
+from shaftwork.results.measures import Measure
+from shaftwork.sweep.lane_program import LaneProgram
 
+Mask = NDArray[np.bool_]
 ModeNames = tuple[str, ...]
 """The mode of every element; empty where no part changes its mode."""
 
 
 class EnsembleCode:
-    """The programs of one set of equations.
+    """The program of one set of equations.
 
     Args:
         model: the equations.
-        program: the heyoka program for one variant.
+        guards: that end their modes, in states, parameters and time.
         stores: what the equations store.
         measures: what is read.
 
@@ -40,52 +37,25 @@ class EnsembleCode:
         CompileError: variants cannot run side by side in them.
     """
 
-    def __init__(self, model: Model, program: Any, stores: StateTransfer, measures: Sequence[Measure]) -> None:
-        if model.rows is None or program is None or not model.states:
+    def __init__(
+        self, model: Model, guards: Sequence[Expr], stores: StateTransfer, measures: Sequence[Measure]
+    ) -> None:
+        if model.rows is None or not model.states:
             raise CompileError("These equations have no program of their own.")
-        self.model, self._rows, self._stores = model, model.rows, stores
-        self._expressed = Observables(model.form, model.rows)
-        quantities = [self._expressed.quantity(measure.quantity) for measure in measures]
+        self.model, self._stores = model, stores
+        expressed = Observables(model.form, model.rows)
+        quantities = [expressed.quantity(measure.quantity) for measure in measures]
         read = [expression for expression in quantities if expression is not None]
         if len(read) < len(quantities):
             raise CompileError("A measure is of a power, an energy or a place along a shaft.")
-        self._extremes = [row for row, measure in enumerate(measures) if measure.kind in EXTREMES]
-        integrated = [row for row, measure in enumerate(measures) if measure.kind in POWERS]
-        self.integral_of = {row: k for k, row in enumerate(integrated)}
-        """By measure, which of the integrals behind the states is its."""
-        self.program: LaneProgram = lane_program(program, model.rows, read)
-        self.step = LaneStep(self.program, tuple(measure.kind for measure in measures))
-        self._parts = {"rates": self.program.rates, "guards": self.program.guards, "shown": self.program.quantities}
-        stored = [self._expressed.store(name) for name in stores.names] if self.program.guards else []
-        self._parts["stored"] = _lane_expressions(self._rows, stored)
-        expressions = tuple(one for part in self._parts.values() for one in part)
-        self._points = lane_function(expressions, self.program.variables)
-        """What is asked for at the ends of phases."""
-
-    def extreme(self, row: int) -> int:
-        """Which of the quantities that a step shows is that of a measure that is an extreme."""
-        return self._extremes.index(row)
-
-    def guard(self, number: int) -> int:
-        """Which of the quantities that a step shows is a guard."""
-        return len(self._extremes) + number
+        stored = [expressed.store(name) for name in stores.names] if guards else []
+        kinds = [measure.kind for measure in measures]
+        self.program = LaneProgram(model.rows, guards, read, kinds, stored, model.name)
 
     def motion(self, t: Array, x: Array, p: Array) -> tuple[Array, Array]:
         """Rates (n, k) and guards (guards, k) at times (k,), states (n, k), parameters (parameters, k)."""
-        parts = self._part(t, x, p)
+        parts = self.program.points(t, x, p)
         return parts["rates"], parts["guards"]
-
-    def stored(self, t: Array, x: Array, p: Array) -> Array:
-        """All that is stored, in the order of the names of `StateTransfer`; arguments as for `motion`."""
-        return self._part(t, x, p)["stored"]
-
-    def shown(self, t: Array, x: Array, p: Array) -> Array:
-        """What the measures read; arguments as for `motion`."""
-        return self._part(t, x, p)["shown"]
-
-    def _part(self, t: Array, x: Array, p: Array) -> dict[str, Array]:
-        ends = np.cumsum([len(part) for part in self._parts.values()])[:-1]
-        return dict(zip(self._parts, np.split(self._points(t, x, p), ends), strict=True))
 
     @cached_property
     def state_rows(self) -> list[int]:
@@ -97,19 +67,6 @@ class EnsembleCode:
         """Places of torques and currents among all that is stored, and of the rest."""
         through = [k for k, name in enumerate(self._stores.names) if name in self._stores.through]
         return through, [k for k in range(len(self._stores.names)) if k not in through]
-
-
-def _lane_expressions(rows: Rows, expressions: Sequence[Expr]) -> tuple[Any, ...]:
-    """Expressions of a network in heyoka's terms.
-
-    Raises:
-        CompileError: one has no counterpart in heyoka.
-    """
-    translator = Translator(rows.states, TIME, tuple(Symbol(p.name, real=True) for p in rows.parameters))
-    translated = tuple(translator.expression(expression) for expression in expressions)
-    if translator.switches or translator.held:
-        raise CompileError("A store switches by a condition, which variants side by side do not follow.")
-    return translated
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,6 +104,24 @@ class EnsembleEquations:
         """The guards that end one of the modes."""
         return np.flatnonzero(self.sides)
 
+    def pieces(self, t: Array, p: Array, span: tuple[float, float]) -> Array:
+        """(3, k) where lanes at times (k,) begin and stop, and the latest time at which something is evaluated, s.
+
+        They stop where a law jumps or bends because of the time alone, and begin just behind such an instant.
+
+        Args:
+            t: s.
+            p: (parameters, k).
+            span: start and end of the motion, s.
+        """
+        switching, count = self.code.model.switching, len(self.code.model.parameters)
+        if set(switching.places).isdisjoint(place for place, _ in self._places):
+            times, lanes = np.unique(t, return_inverse=True)
+            line = switching.timeline(p[:count, 0], *span, modes=False)
+            return np.array([_piece(line, time, span[1]) for time in times.tolist()]).T[:, lanes]
+        lines = (switching.timeline(values, *span, modes=False) for values in p[:count].T)
+        return np.array([_piece(line, time, span[1]) for line, time in zip(lines, t.tolist(), strict=True)]).T
+
     def parameters(self, columns: Array) -> Array:
         """(parameters, k) for the values (names, k) of those that vary, with what is derived from them."""
         p = np.repeat(np.asarray(self._base)[:, None], columns.shape[1], axis=1)
@@ -163,12 +138,10 @@ class EnsembleEquations:
         return before.code is not self.code or not self.sides[guard] == before.sides[guard] != 0.0
 
 
-class Met(IntEnum):
-    """What a lane has met where that is no guard: nothing, the end of the motion, or what it cannot pass."""
-
-    NOTHING = -1
-    THE_END = -2
-    A_LIMIT = -3
+def _piece(line: Timeline, time: float, end: float) -> tuple[float, float, float]:
+    """Where a lane begins and stops, and the latest time at which something is evaluated, s."""
+    stop = next((one for one in line.stops if one > time), end)
+    return line.sides(time)[1], stop, line.sides(stop)[0]
 
 
 @dataclass(frozen=True, eq=False)

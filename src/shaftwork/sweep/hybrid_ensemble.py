@@ -9,7 +9,6 @@ from typing import cast
 import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array
-from shaftwork.core.errors import CompileError
 from shaftwork.hybrid.consistency import (
     clear_of_limit,
     drift,
@@ -24,10 +23,15 @@ from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import with_modes
 from shaftwork.hybrid.modes.starts import conditional
 from shaftwork.sweep.ensemble import Ensemble
-from shaftwork.sweep.ensemble_equations import EnsembleCode, EnsembleEquations, ModeNames, PhaseEntry, VariantGroup
-from shaftwork.sweep.lane_steps import Mask
+from shaftwork.sweep.ensemble_equations import (
+    EnsembleCode,
+    EnsembleEquations,
+    Mask,
+    ModeNames,
+    PhaseEntry,
+    VariantGroup,
+)
 
-CLOCKED = "A limit at which a mode ends changes with the time by itself, and a long step might pass over that."
 Course = tuple[Array, Array, Array, Array]
 """Times (k,), states (n, k), their rates, and guards (guards, k)."""
 
@@ -45,9 +49,7 @@ class HybridEnsemble(Ensemble):
 
     def _equations_in(self, modes: ModeNames) -> EnsembleEquations:
         equations = self._equation_sets.of(modes)
-        if equations.clocks:
-            raise CompileError(CLOCKED)
-        code = self.code_of(equations.model, equations.program, equations.stores)
+        code = self.code_of(equations.model, equations.expressions, equations.stores)
         base = equations.vector(self.first, self._equation_sets.numbers(modes))
         return GuardedEquations(code, equations, modes, base, self.names, self.span)
 

@@ -145,10 +145,10 @@ class Worker:
         reasons = {
             f"there are fewer than {SIDE_BY_SIDE} variants": len(task) < SIDE_BY_SIDE,
             "a measure is a function of a whole solution": len(read) < len(task.measures),
-            f"engine = '{options['engine']}' was asked for": options["engine"] not in ("auto", "heyoka"),
+            f"engine = '{options['engine']}' was asked for": options["engine"] not in ("auto", "heyoka", "numba"),
             "start values are given": bool(options["initial"]),
             "each variant starts in its own steady state": task.steady,
-            "heyoka is not installed (extra 'fast')": not available("heyoka"),
+            "numba is not installed (extra 'fast')": not available("numba"),
         }
         self.why = next((reason for reason, holds in reasons.items() if holds), "")
         if self.why:

@@ -1,0 +1,200 @@
+"""The machine code of one set of equations for many variants side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+
+import numpy as np
+from numba import njit
+from numba.core.errors import NumbaError
+from sympy import Add, Dummy, Expr
+
+from shaftwork.codegen.array_form.elements import Array
+from shaftwork.codegen.machine_program import Terms, jumping
+from shaftwork.codegen.taylor.heyoka_parameters import Fixed
+from shaftwork.components.law_slopes import slope
+from shaftwork.components.laws import t as TIME
+from shaftwork.core.errors import CompileError
+from shaftwork.formulation.explicit_rows import Rows
+from shaftwork.numerics.machine_code import LANES, LaneBody, lane_function, run_at
+from shaftwork.results.measures import EXTREMES, POWERS
+from shaftwork.sweep.lane_loops import LaneCourse, LaneTables, follow
+from shaftwork.sweep.lane_step import STAGES, Judged, StepWriter
+
+OF_A_STEP, LOOSEST_TOLERANCE, TIGHTEST_TOLERANCE = 0.1, 1e-7, 1e-13
+"""The tolerance of a step as a part of that of the motion, and its bounds."""
+
+
+class LaneProgram:
+    """The rates of variants, what is seen of their motion, and what is asked for where they change their modes.
+
+    Args:
+        rows: the explicit state equations.
+        guards: that end a lane where they rise through zero on their side.
+        quantities: what is measured.
+        kinds: of each of them the measure that is wanted.
+        stored: what goes over to other equations.
+        title: of the network, for messages.
+
+    Raises:
+        CompileError: a law has no machine code.
+    """
+
+    def __init__(
+        self,
+        rows: Rows,
+        guards: Sequence[Expr],
+        quantities: Sequence[Expr],
+        kinds: Sequence[str],
+        stored: Sequence[Expr],
+        title: str,
+    ) -> None:
+        self._parts = {"rates": rows.rates, "guards": tuple(guards), "shown": tuple(quantities), "stored": stored}
+        jumps = jumping(rows.states, (*rows.rates, *quantities))
+        signs = [(k, sign) for k, kind in enumerate(kinds) for sign in EXTREMES.get(kind, ())]
+        seen = [*(quantities[k] for k, _ in signs), *guards, *jumps]
+        integrated = [(quantities[k], POWERS[kind]) for k, kind in enumerate(kinds) if kind in POWERS]
+        blind = [one for one in dict.fromkeys(seen) if one.has(TIME)]
+        slopes = (*rows.rates, *(quantity**power for quantity, power in integrated), *blind)
+        motion, judged = _Motion(rows), dict[Expr, Judged]()
+        sight = [derivative for one in seen for derivative in motion.jet(one)]
+        moving = len(rows.states) + len(integrated)
+        for quantity in dict.fromkeys((*quantities, *blind)):
+            columns = tuple(k for k, x in enumerate(rows.states) if x in quantity.free_symbols)
+            slope_row = moving + blind.index(quantity) if quantity in blind else None
+            judged[quantity] = Judged(len(sight), columns, quantity in quantities, slope_row)
+            sight += [quantity, *(slope(quantity, rows.states[k]) for k in columns)]
+        points = [one for part in self._parts.values() for one in part]
+        expressions = (*slopes, *motion.definitions.values(), *sight, *points)
+        self._fixed = Fixed(rows.parameters, (*rows.states, TIME, *motion.definitions), expressions)
+        self._places = {x: ("y", k) for k, x in enumerate(rows.states)}
+        self._places |= {symbol: ("p", k) for k, symbol in enumerate(rows.parameters)}
+        self._places |= {part: ("p", len(rows.parameters) + k) for part, k in self._fixed.places.items()}
+        place = _rows(len(rows.states), moving, len(slopes), len(sight), len(rows.parameters) + len(self._fixed.places))
+        writer = partial(lane_function, rows=place)
+        try:
+            rates = writer(partial(self._write, values=slopes, definitions={}))
+            jets = writer(partial(self._write, values=sight, definitions=motion.definitions))
+            integrals = [(judged[quantity], power) for quantity, power in integrated]
+            step = writer(
+                StepWriter(
+                    rates.address, place["slopes"], len(slopes), len(rows.states), integrals, [*judged.values()]
+                )
+            )
+            self._code = rates, jets, step, writer(partial(self._write, values=points, definitions={}))
+        except NumbaError as error:
+            raise CompileError(f"'{title}' has a law that numba cannot compile: {error}") from error
+        self.guards, self.free = len(guards), len(jumps)
+        """How many guards there are, and how many switches of laws behind them."""
+        self.integrated = [k for k, kind in enumerate(kinds) if kind in POWERS]
+        """Which measures are integrals."""
+        self._tables = LaneTables(
+            *(function.address for function in self._code[:3]),
+            height=place["end"],
+            states=len(rows.states),
+            moving=moving,
+            **{name: place[name] for name in ("x", "time", "size", "high", "y", "moment", "new", "error", "p")},
+            first=place["slopes"],
+            seen=place["sight"],
+            guards=len(guards) + len(jumps),
+            free=len(jumps),
+            extremes=np.array([(n, k) for n, (k, _) in enumerate(signs)], dtype=np.int64).reshape(-1, 2),
+            signs=np.array([sign for _, sign in signs]),
+        )
+
+    def _write(self, body: LaneBody, values: Sequence[Expr], definitions: Mapping[Dummy, Expr]) -> None:
+        terms = Terms(body, self._fixed, self._places)
+        for symbol, value in definitions.items():
+            terms.define(symbol, value)
+        for place, value in enumerate(values):
+            body.write(place, terms.value(value))
+
+    def parameters(self, p: Array) -> Array:
+        """(parameters, k) those of the model and what is fixed by them, from those of the model alone."""
+        return np.concatenate([p, self._fixed.values(p)])
+
+    def follow(self, course: LaneCourse, sizes: Array, rtol: float, span: tuple[float, float]) -> None:
+        """Follow variants up to a guard, their end, or what they cannot pass.
+
+        Args:
+            course: of all of them; it is changed in place.
+            sizes: (n,) nominal, of the states.
+            rtol: relative tolerance.
+            span: start and end of the motion, s.
+        """
+        tolerance = min(max(OF_A_STEP * rtol, TIGHTEST_TOLERANCE), LOOSEST_TOLERANCE)
+        follow(self._tables, course, sizes, np.array([tolerance, (span[1] - span[0]) / 50, span[1]]))
+
+    def points(self, t: Array, x: Array, p: Array) -> dict[str, Array]:
+        """Rates, guards, what is shown and what is stored, (values, k) each, of k variants.
+
+        Args:
+            t: (k,) s.
+            x: (n, k) states.
+            p: (parameters, k) with what is fixed by them.
+        """
+        counts = [len(part) for part in self._parts.values()]
+        values, tables = np.empty((sum(counts), t.size)), self._tables
+        _evaluate(self._code[3].address, tables.y, tables.moment, tables.p, tables.height, t, x, p, values)
+        return dict(zip(self._parts, np.split(values, np.cumsum(counts)[:-1]), strict=True))
+
+
+def _rows(states: int, moving: int, slopes: int, sight: int, parameters: int) -> dict[str, int]:
+    """The first row of each array in the memory of a block, and their end."""
+    counts = {"nominal": states, "tolerance": 1, "x": moving, "time": 1, "size": 1, "high": 1, "y": moving}
+    counts |= {"moment": 1, "new": moving, "error": 1, "slopes": STAGES * slopes, "fifth": slopes, "third": slopes}
+    counts |= {"fifth of states": states, "third of states": states, "sight": sight, "p": parameters, "end": 0}
+    ends = np.cumsum([0, *counts.values()]).tolist()
+    return dict(zip(counts, ends, strict=False))
+
+
+class _Motion:
+    """Derivatives by time along a motion.
+
+    Args:
+        rows: its equations.
+    """
+
+    def __init__(self, rows: Rows) -> None:
+        self._rates = dict(zip(rows.states, rows.rates, strict=True))
+        self.definitions: dict[Dummy, Expr] = {}
+        """What stands for rates of states and for their derivatives by time; each after those in it."""
+        self._named: dict[Expr, Dummy] = {}
+
+    def jet(self, quantity: Expr) -> tuple[Expr, ...]:
+        """A quantity and its first two derivatives."""
+        first = self._moved(quantity)
+        return quantity, first, self._moved(first)
+
+    def _moved(self, quantity: Expr) -> Expr:
+        """The derivative of what may hold rates, by their symbols."""
+        moving = [symbol for symbol in quantity.free_symbols if symbol in self._rates or symbol in self.definitions]
+        parts = [slope(quantity, symbol) * self._rate(symbol) for symbol in sorted(moving, key=str)]
+        return Add(slope(quantity, TIME), *parts)
+
+    def _rate(self, symbol: Expr) -> Dummy:
+        """What stands for the derivative of a state, or of a rate."""
+        if symbol not in self._named:
+            rate = self._rates[symbol] if symbol in self._rates else self._moved(self.definitions[symbol])
+            self._named[symbol] = Dummy(real=True)
+            self.definitions[self._named[symbol]] = rate
+        return self._named[symbol]
+
+
+@njit(error_model="numpy", cache=True)
+def _evaluate(function, y, moment, first, height, t, x, p, values):  # type: ignore[no-untyped-def]
+    """Write the values (rows, k) of a function at times (k,), states (n, k) and parameters (parameters, k)."""
+    memory = np.zeros((height + values.shape[0], LANES))
+    for start in range(0, t.size, LANES):
+        for lane in range(LANES):
+            variant = min(start + lane, t.size - 1)
+            memory[moment, lane] = t[variant]
+            for row in range(x.shape[0]):
+                memory[y + row, lane] = x[row, variant]
+            for row in range(p.shape[0]):
+                memory[first + row, lane] = p[row, variant]
+        run_at(function, memory, height)
+        for lane in range(min(LANES, t.size - start)):
+            for row in range(values.shape[0]):
+                values[row, start + lane] = memory[height + row, lane]
