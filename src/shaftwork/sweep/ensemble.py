@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from sympy import Expr
 
-from shaftwork.codegen.array_form.elements import Array
+from shaftwork.codegen.array_form.elements import Array, Index
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import CompileError, NetworkError
@@ -29,7 +29,7 @@ from shaftwork.sweep.ensemble_equations import (
     VariantGroup,
     joined,
 )
-from shaftwork.sweep.lane_loops import A_LIMIT, THE_END, LaneCourse
+from shaftwork.sweep.lane_loops import A_LIMIT, NOTHING, THE_END, LaneCourse
 
 
 class Ensemble:
@@ -198,10 +198,11 @@ class _VariantCourse:
             return []
         p, program = equations.parameters(self.columns[:, group.lanes]), equations.code.program
         begin, ends, highs = equations.pieces(group.t, p, self.ensemble.span)
-        group, p, entry, on = _consistent(group, p, equations.entered(begin, group.x, p))
-        if not group.lanes.size:
-            return []
-        course = self._course(equations, group, p, entry, (begin[on], ends[on], highs[on]))
+        entry = equations.entered(begin, group.x, p)
+        following = self._past_guards(equations, group, entry.met)
+        on = entry.met == NOTHING
+        group, p = group.some(on), p[:, on]
+        course = self._course(equations, group, p, entry.some(on), (begin[on], ends[on], highs[on]))
         program.follow(course, equations.sizes, self.ensemble.rtol, self.ensemble.span)
         for row, place in enumerate(program.integrated):
             self.values[place, group.lanes] += course.integrals[row]
@@ -209,10 +210,14 @@ class _VariantCourse:
         there, met = VariantGroup(group.modes, group.lanes, course.t, course.x), course.met
         over = (met == THE_END) & (course.t >= self.ensemble.span[1])
         self._end(equations, there, p, over)
-        following = [there.some((met == THE_END) & ~over | (met >= program.guards))]  # in the same modes
-        for guard in np.unique(met[(met >= 0) & (met < program.guards)]).tolist():
-            following += self._changed(equations, there.some(met == guard), guard)
-        return following
+        onward = (met == THE_END) & ~over | (met >= program.guards)  # in the same modes
+        met = np.where(met < program.guards, met, NOTHING)
+        return [*following, there.some(onward), *self._past_guards(equations, there, met)]
+
+    def _past_guards(self, equations: EnsembleEquations, group: VariantGroup, met: Index) -> list[VariantGroup]:
+        """Past the guards (k,) that lanes have met, where they have met one."""
+        guards = np.unique(met[met >= 0]).tolist()
+        return [new for guard in guards for new in self._changed(equations, group.some(met == guard), guard)]
 
     def _course(
         self, equations: EnsembleEquations, group: VariantGroup, p: Array, entry: PhaseEntry, pieces: Sequence[Array]
@@ -265,9 +270,3 @@ class _VariantCourse:
                 values[row] = np.sqrt(np.maximum(values[row], 0.0)) if measure.kind == "rms" else values[row]
         self.done &= np.isfinite(values).all(axis=0)
         return values
-
-
-def _consistent(group: VariantGroup, p: Array, entry: PhaseEntry) -> tuple[VariantGroup, Array, PhaseEntry, Mask]:
-    """Those of a group whose modes are consistent with their motion, and which these are."""
-    on = entry.good
-    return group.some(on), p[:, on], PhaseEntry(on[on], entry.offsets[:, on]), on

@@ -17,7 +17,8 @@ from shaftwork.core.errors import CompileError
 from shaftwork.formulation.observables import Observables
 from shaftwork.pipeline.model import Model
 from shaftwork.results.measures import Measure
-from shaftwork.sweep.lane_program import LaneProgram
+from shaftwork.sweep.lane_loops import NOTHING
+from shaftwork.sweep.lane_program import lane_program
 
 Mask = NDArray[np.bool_]
 ModeNames = tuple[str, ...]
@@ -49,8 +50,8 @@ class EnsembleCode:
         if len(read) < len(quantities):
             raise CompileError("A measure is of a power, an energy or a place along a shaft.")
         stored = [expressed.store(name) for name in stores.names] if guards else []
-        kinds = [measure.kind for measure in measures]
-        self.program = LaneProgram(model.rows, guards, read, kinds, stored, model.name)
+        kinds = tuple(measure.kind for measure in measures)
+        self.program = lane_program(model.rows, tuple(guards), tuple(read), kinds, tuple(stored))
 
     def motion(self, t: Array, x: Array, p: Array) -> tuple[Array, Array]:
         """Rates (n, k) and guards (guards, k) at times (k,), states (n, k), parameters (parameters, k)."""
@@ -74,12 +75,16 @@ class PhaseEntry:
     """Where variants enter a phase.
 
     Args:
-        good: (k,) whether its modes are consistent with the motion.
+        met: (k,) NOTHING where its modes are consistent with the motion, the guard that alone is not, or A_LIMIT.
         offsets: (guards, k) how far beyond zero each guard has to go.
     """
 
-    good: Mask
+    met: Index
     offsets: Array
+
+    def some(self, on: Mask) -> PhaseEntry:
+        """Of the lanes (k,) that are marked."""
+        return PhaseEntry(self.met[on], self.offsets[:, on])
 
 
 class EnsembleEquations:
@@ -131,7 +136,7 @@ class EnsembleEquations:
 
     def entered(self, t: Array, x: Array, p: Array) -> PhaseEntry:  # noqa: ARG002
         """Whether the modes are consistent with the motion in lanes (k,): without guards they are."""
-        return PhaseEntry(np.ones(t.size, dtype=bool), np.zeros((0, t.size)))
+        return PhaseEntry(np.full(t.size, NOTHING), np.zeros((0, t.size)))
 
     def leaves_behind(self, before: EnsembleEquations, guard: int) -> bool:
         """Whether the guard by which these modes were entered is met no more; `entered` looks at all the others."""

@@ -31,6 +31,7 @@ from shaftwork.sweep.ensemble_equations import (
     PhaseEntry,
     VariantGroup,
 )
+from shaftwork.sweep.lane_loops import A_LIMIT, NOTHING
 
 Course = tuple[Array, Array, Array, Array]
 """Times (k,), states (n, k), their rates, and guards (guards, k)."""
@@ -126,8 +127,10 @@ class GuardedEquations(EnsembleEquations):
             drifts = drift(side * (here[3] - now), side * (beside[3] - near), bands)
             turns = np.where(turns == 0, drifts, turns)
         where = side_of_limit(excess, bands)
-        good = (where < 0) | ((where == 0) & (turns < 0))
-        return PhaseEntry(np.all(good[self.watched], axis=0), clear_of_limit(excess, bands))
+        beyond = ((where > 0) | ((where == 0) & (turns >= 0))) & (self.sides != 0)[:, None]
+        surely = beyond & ((where > 0) | (turns > 0))
+        count, alone = beyond.sum(axis=0), np.where(surely.any(axis=0), surely.argmax(axis=0), A_LIMIT)
+        return PhaseEntry(np.where(count == 0, NOTHING, np.where(count == 1, alone, A_LIMIT)), clear_of_limit(excess, bands))
 
     def _step(self, rates: Array) -> Array:
         """(k,) how far in s the further course is looked at; see `Regime.ahead`."""

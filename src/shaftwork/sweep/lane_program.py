@@ -15,6 +15,7 @@ from shaftwork.codegen.machine_program import Terms, jumping
 from shaftwork.codegen.taylor.heyoka_parameters import Fixed
 from shaftwork.components.law_slopes import slope
 from shaftwork.components.laws import t as TIME
+from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import CompileError
 from shaftwork.formulation.explicit_rows import Rows
 from shaftwork.numerics.machine_code import LANES, LaneBody, lane_function, run_at
@@ -24,6 +25,8 @@ from shaftwork.sweep.lane_step import STAGES, Judged, StepWriter
 
 OF_A_STEP, LOOSEST_TOLERANCE, TIGHTEST_TOLERANCE = 0.1, 1e-7, 1e-13
 """The tolerance of a step as a part of that of the motion, and its bounds."""
+KEPT = 64
+"""Programs that are kept."""
 
 
 class LaneProgram:
@@ -35,7 +38,6 @@ class LaneProgram:
         quantities: what is measured.
         kinds: of each of them the measure that is wanted.
         stored: what goes over to other equations.
-        title: of the network, for messages.
 
     Raises:
         CompileError: a law has no machine code.
@@ -48,7 +50,6 @@ class LaneProgram:
         quantities: Sequence[Expr],
         kinds: Sequence[str],
         stored: Sequence[Expr],
-        title: str,
     ) -> None:
         self._parts = {"rates": rows.rates, "guards": tuple(guards), "shown": tuple(quantities), "stored": stored}
         jumps = jumping(rows.states, (*rows.rates, *quantities))
@@ -84,7 +85,7 @@ class LaneProgram:
             )
             self._code = rates, jets, step, writer(partial(self._write, values=points, definitions={}))
         except NumbaError as error:
-            raise CompileError(f"'{title}' has a law that numba cannot compile: {error}") from error
+            raise CompileError(f"A law has no machine code: {error}") from error
         self.guards, self.free = len(guards), len(jumps)
         """How many guards there are, and how many switches of laws behind them."""
         self.integrated = [k for k, kind in enumerate(kinds) if kind in POWERS]
@@ -147,6 +148,17 @@ def _rows(states: int, moving: int, slopes: int, sight: int, parameters: int) ->
     counts |= {"fifth of states": states, "third of states": states, "sight": sight, "p": parameters, "end": 0}
     ends = np.cumsum([0, *counts.values()]).tolist()
     return dict(zip(counts, ends, strict=False))
+
+
+def lane_program(
+    rows: Rows, guards: tuple[Expr, ...], quantities: tuple[Expr, ...], kinds: tuple[str, ...], stored: tuple[Expr, ...]
+) -> LaneProgram:
+    """The program for all networks with these expressions; arguments as for `LaneProgram`."""
+    key = rows.states, rows.parameters, rows.rates, guards, quantities, kinds, stored
+    return _programs(key, lambda: LaneProgram(rows, guards, quantities, kinds, stored))
+
+
+_programs = BoundedCache[tuple[object, ...], LaneProgram](KEPT)
 
 
 class _Motion:
