@@ -121,9 +121,12 @@ class EnsembleEquations:
         """
         switching, count = self.code.model.switching, len(self.code.model.parameters)
         if set(switching.places).isdisjoint(place for place, _ in self._places):
-            times, lanes = np.unique(t, return_inverse=True)
             line = switching.timeline(p[:count, 0], *span, modes=False)
-            return np.array([_piece(line, time, span[1]) for time in times.tolist()]).T[:, lanes]
+            stops, begin = np.array([*line.stops, span[1]]), t.copy()
+            for time in line.times:
+                begin[t == time] = line.sides(time)[1]
+            place = np.minimum(np.searchsorted(stops, t, side="right"), stops.size - 1)
+            return np.array([begin, stops[place], np.array([line.sides(stop)[0] for stop in stops.tolist()])[place]])
         lines = (switching.timeline(values, *span, modes=False) for values in p[:count].T)
         return np.array([_piece(line, time, span[1]) for line, time in zip(lines, t.tolist(), strict=True)]).T
 

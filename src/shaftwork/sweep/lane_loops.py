@@ -26,49 +26,71 @@ NOTHING, THE_END, A_LIMIT = -1, -2, -3
 _compiled = njit(error_model="numpy", cache=True)
 
 
+ROWS = (
+    "nominal", "tolerance", "longest", "time", "size", "high", "moment", "end", "step", "active", "moved", "close",
+    "count", "last time", "begun", "x", "y", "new", "last x", "slopes", "sight", "last sight", "best", "lows", "sides",
+    "offsets", "p",
+)  # fmt: skip
+"""Arrays in the memory of a block of lanes: nominal sizes of the states, the tolerance and the longest step; time at the
+start of a step, its length, and the latest time at which anything is evaluated; the moment at which it is; the time up
+to which a lane goes, the length of its next step; whether it is on its way, has moved, and is to be looked at more
+closely; how many steps it has made, when its last step began and it itself, s; states and integrals at the start, at
+the moment, at the end and at the start of the last step; slopes of all stages; what is seen, and was at the start of
+the last step; the largest and lowest values; the sides on which guards are met and how far beyond zero; parameters."""
+
+
 class LaneTables(NamedTuple):
-    """The functions of a program, and where its numbers stand: rows of the memory of a block of lanes.
+    """The functions of a program, and where its numbers stand: the first rows of `ROWS`.
 
     Args:
-        slopes: address of what writes the rates at y and the moment.
-        sight: of what writes jets of all that is seen there.
-        step: of what makes a step, from its first slopes on, with its error.
+        rates: address of what writes the slopes at y and the moment.
+        jets: of what writes what is seen there.
+        probe: of what makes a step of a given size.
+        advance: of what makes a step that is as long as the tolerance lets it be.
+        compare: of what looks at the ends of the last step.
         height: rows in all.
         states: how many; integrals follow them,
         moving: and so many are both.
-        x: first row of states and integrals at the start of a step.
-        time: row of the time there, s.
-        size: row of the length of the step, s.
-        high: row of the latest time at which anything is evaluated, s.
-        y: first row of states at the moment,
-        moment: and the row of this, s.
-        new: first row of states and integrals at the end of the step.
-        error: row of its error in units of the tolerance.
-        first: first row of the slopes at the start.
-        seen: first row of the jets.
-        p: first row of the parameters.
         guards: how many of those seen are guards and switches; they come last.
         free: how many of these are switches of laws; they come last.
         extremes: (extremes, 2) which of those seen, and the row of its largest value.
         signs: (extremes,) times which it is the largest.
     """
 
-    slopes: int
-    sight: int
-    step: int
+    rates: int
+    jets: int
+    probe: int
+    advance: int
+    compare: int
     height: int
     states: int
     moving: int
-    x: int
+    nominal: int
+    tolerance: int
+    longest: int
     time: int
     size: int
     high: int
-    y: int
     moment: int
+    end: int
+    step: int
+    active: int
+    moved: int
+    close: int
+    count: int
+    last_time: int
+    begun: int
+    x: int
+    y: int
     new: int
-    error: int
-    first: int
-    seen: int
+    last_x: int
+    slopes: int
+    sight: int
+    last_sight: int
+    best: int
+    lows: int
+    sides: int
+    offsets: int
     p: int
     guards: int
     free: int
@@ -105,34 +127,18 @@ class LaneCourse(NamedTuple):
 
 
 class _Lanes(NamedTuple):
-    """Eight lanes; arrays are (rows, LANES).
+    """Eight lanes.
 
     Args:
-        now: memory of a block, at the ends of the last steps.
-        last: the same at their starts.
-        probe: memory of a block in which one lane is followed.
+        now: (rows, LANES) memory.
+        probe: (rows, LANES) memory in which one lane is followed.
         stack: intervals in which a peak is looked for.
-        sides: on which guards are met.
-        offsets: how far beyond zero they have to go.
-        best: largest values so far,
-        lows: and the lowest.
-        close: (LANES,) where more than the ends of a step is to be looked at.
-        moved: (LANES,) which have made a step.
-        steps: (3, LANES) the length of the next step, the time at the start in s, and how many steps there were.
-        variants: (LANES,) which each of them is; -1 for none.
+        variants: (LANES,) which each lane is; -1 for none.
     """
 
     now: Array
-    last: Array
     probe: Array
     stack: Array
-    sides: Array
-    offsets: Array
-    best: Array
-    lows: Array
-    close: Array
-    moved: Array
-    steps: Array
     variants: Index
 
 
@@ -143,8 +149,8 @@ def _look(tables, memory):  # type: ignore[no-untyped-def]
         for row in range(tables.moving):
             memory[tables.y + row, lane] = memory[tables.x + row, lane]
         memory[tables.moment, lane] = min(memory[tables.time, lane], memory[tables.high, lane])
-    run_at(tables.sight, memory, tables.seen)
-    run_at(tables.slopes, memory, tables.first)
+    run_at(tables.jets, memory, tables.sight)
+    run_at(tables.rates, memory, tables.slopes)
 
 
 @_compiled
@@ -199,8 +205,8 @@ def _repeat(tables, lanes, lane):  # type: ignore[no-untyped-def]
     for row in range(tables.height):
         probe[row] = lanes.now[row, lane]
     for row in range(tables.moving):
-        probe[tables.x + row] = lanes.last[tables.x + row, lane]
-    probe[tables.time] = lanes.last[tables.time, lane]
+        probe[tables.x + row] = lanes.now[tables.last_x + row, lane]
+    probe[tables.time] = lanes.now[tables.last_time, lane]
     _look(tables, probe)
 
 
@@ -208,11 +214,11 @@ def _repeat(tables, lanes, lane):  # type: ignore[no-untyped-def]
 def _probe(tables, probe, t):  # type: ignore[no-untyped-def]
     """Follow the lane in a probe up to a time in s, and see what is there."""
     probe[tables.size] = t - probe[tables.time, 0]
-    run_at(tables.step, probe, 0)
+    run_at(tables.probe, probe, 0)
     for row in range(tables.moving):
         probe[tables.y + row] = probe[tables.new + row]
     probe[tables.moment] = min(t, probe[tables.high, 0])
-    run_at(tables.sight, probe, tables.seen)
+    run_at(tables.jets, probe, tables.sight)
 
 
 @_compiled
@@ -282,44 +288,19 @@ def _top(tables, lanes, row, sign, offset, best, near, first):  # type: ignore[n
 
 
 @_compiled
-def _compare(tables, lanes):  # type: ignore[no-untyped-def]
-    """Take the ends of the last steps into the extremes, and tell where more is to be looked at."""
-    now, last, close = lanes.now, lanes.last, lanes.close
-    extremes = tables.extremes.shape[0]
-    for lane in range(LANES):
-        close[lane] = False
-        if not lanes.moved[lane]:
-            continue
-        length = now[tables.time, lane] - last[tables.time, lane]
-        for guard in range(tables.guards):
-            side, offset = lanes.sides[guard, lane], lanes.offsets[guard, lane]
-            row = tables.seen + JET * (extremes + guard)
-            left, right = _jet(last, row, side, offset, lane), _jet(now, row, side, offset, lane)
-            inside, beyond = _reach(length, left, right)
-            close[lane] |= side != 0.0 and (right[0] > 0 or inside + beyond > 0)
-        for k in range(extremes):
-            row, sign = tables.seen + JET * tables.extremes[k, 0], tables.signs[k]
-            left, right = _jet(last, row, sign, 0.0, lane), _jet(now, row, sign, 0.0, lane)
-            higher, (inside, beyond) = max(left[0], right[0]), _reach(length, left, right)
-            if not close[lane]:
-                lanes.best[k, lane] = max(lanes.best[k, lane], higher)
-                lanes.lows[k, lane] = min(lanes.lows[k, lane], left[0], right[0])
-            close[lane] |= inside > higher and inside + beyond > lanes.best[k, lane]
-
-
-@_compiled
 def _first_met(tables, lanes, lane):  # type: ignore[no-untyped-def]
     """The guard that is met first in the last step of a lane, and when in s; NOTHING where none is."""
-    low, high, met = lanes.last[tables.time, lane], lanes.now[tables.time, lane], NOTHING
+    now, met, extremes = lanes.now, NOTHING, tables.extremes.shape[0]
+    low, high = now[tables.last_time, lane], now[tables.time, lane]
     end = high
     for guard in range(tables.guards):
-        side, offset = lanes.sides[guard, lane], lanes.offsets[guard, lane]
-        row = tables.seen + JET * (tables.extremes.shape[0] + guard)
-        left, right = _jet(lanes.last, row, side, offset, lane), _jet(lanes.now, row, side, offset, lane)
+        side, offset, number = now[tables.sides + guard, lane], now[tables.offsets + guard, lane], extremes + guard
+        left = _jet(now, tables.last_sight + JET * number, side, offset, lane)
+        right = _jet(now, tables.sight + JET * number, side, offset, lane)
         inside, beyond = _reach(high - low, left, right)
         if side == 0.0 or (right[0] <= 0 and inside + beyond <= 0):
             continue
-        upper, value = high, right[0]
+        upper, value, row = high, right[0], tables.sight + JET * number
         if value <= 0:
             _put(lanes.stack, 0, low, left, high, right, 0.0, 0.0)
             near = TYPED * max(abs(left[0]), abs(right[0]))
@@ -334,46 +315,50 @@ def _first_met(tables, lanes, lane):  # type: ignore[no-untyped-def]
 
 
 @_compiled
-def _past(tables, probe, nominal, tolerance, end):  # type: ignore[no-untyped-def]
+def _past(tables, probe, end):  # type: ignore[no-untyped-def]
     """A time in s just past that of a probe, up to which no state moves by more than a hundredth of its tolerance."""
-    longest = np.inf
+    longest, tolerance = np.inf, probe[tables.tolerance, 0]
     for row in range(tables.states):
         x = probe[tables.new + row, 0]
         rate = (x - probe[tables.x + row, 0]) / probe[tables.size, 0]
         if rate != 0.0:
-            longest = min(longest, 0.01 * tolerance * (nominal[row] + abs(x)) / abs(rate))
+            longest = min(longest, 0.01 * tolerance * (probe[tables.nominal + row, 0] + abs(x)) / abs(rate))
     return min(end, probe[tables.moment, 0] + longest)
 
 
 @_compiled
 def _measure(tables, lanes, seen, lane, there, end):  # type: ignore[no-untyped-def]
     """Take the inside of the last step of a lane into the extremes, up to a time in s and what is seen there."""
-    low = lanes.last[tables.time, lane]
+    now = lanes.now
+    low = now[tables.last_time, lane]
     for k in range(tables.extremes.shape[0]):
-        row, sign = tables.seen + JET * tables.extremes[k, 0], tables.signs[k]
-        left, right = _jet(lanes.last, row, sign, 0.0, lane), _jet(seen, row, sign, 0.0, there)
-        best = max(lanes.best[k, lane], left[0], right[0])
-        lanes.lows[k, lane] = min(lanes.lows[k, lane], left[0], right[0])
+        number, sign = JET * tables.extremes[k, 0], tables.signs[k]
+        left = _jet(now, tables.last_sight + number, sign, 0.0, lane)
+        right = _jet(seen, tables.sight + number, sign, 0.0, there)
+        best = max(now[tables.best + k, lane], left[0], right[0])
+        lowest = min(now[tables.lows + k, lane], left[0], right[0])
         _put(lanes.stack, 0, low, left, end, right, 0.0, 0.0)
-        near = TYPED * (best - lanes.lows[k, lane])
-        lanes.best[k, lane], _ = _top(tables, lanes, row, sign, 0.0, best, near, 0)
+        best, _ = _top(tables, lanes, tables.sight + number, sign, 0.0, best, TYPED * (best - lowest), 0)
+        now[tables.best + k, lane], now[tables.lows + k, lane] = best, lowest
 
 
 @_compiled
 def _load(tables, course, lanes, lane, variant):  # type: ignore[no-untyped-def]
     """Let a variant begin in a lane."""
     now = lanes.now
-    now[tables.time, lane], now[tables.high, lane] = course.t[variant], course.highs[variant]
+    now[tables.time, lane], now[tables.begun, lane] = course.t[variant], course.t[variant]
+    now[tables.high, lane], now[tables.end, lane] = course.highs[variant], course.ends[variant]
+    now[tables.active, lane], now[tables.step, lane], now[tables.count, lane] = 1.0, -1.0, 0.0
     for row in range(tables.moving):
         now[tables.x + row, lane] = course.x[row, variant] if row < tables.states else 0.0
     for row in range(course.p.shape[0]):
         now[tables.p + row, lane] = course.p[row, variant]
     for guard in range(tables.guards):
-        lanes.sides[guard, lane] = course.sides[guard, variant]
-        lanes.offsets[guard, lane] = course.offsets[guard, variant]
+        now[tables.sides + guard, lane] = course.sides[guard, variant]
+        now[tables.offsets + guard, lane] = course.offsets[guard, variant]
     for k in range(tables.extremes.shape[0]):
-        lanes.best[k, lane], lanes.lows[k, lane] = course.best[tables.extremes[k, 1], variant], np.inf
-    lanes.steps[0, lane], lanes.steps[1, lane], lanes.steps[2, lane] = -1.0, course.t[variant], 0.0
+        now[tables.best + k, lane] = course.best[tables.extremes[k, 1], variant]
+        now[tables.lows + k, lane] = np.inf
 
 
 @_compiled
@@ -387,48 +372,48 @@ def _leave(tables, course, lanes, memory, x, lane, there, t, met):  # type: igno
         else:
             course.integrals[row - tables.states, variant] += memory[x + row, there]
     for k in range(tables.extremes.shape[0]):
-        row, best = tables.extremes[k, 1], lanes.best[k, lane]
+        row, best = tables.extremes[k, 1], lanes.now[tables.best + k, lane]
         course.best[row, variant] = best if np.isnan(best) else max(course.best[row, variant], best)
 
 
 @_compiled
-def _begin(tables, lanes, lane, nominal):  # type: ignore[no-untyped-def]
-    """The length in s of a first step, which changes no state by more than a hundredth of its size.
+def _begin(tables, lanes, lane):  # type: ignore[no-untyped-def]
+    """Set the first step, which changes no state by more than a hundredth of its size.
 
     A law's switch is met on the side on which its value is not, or to which it does not go.
     """
-    step = np.inf
+    now, step = lanes.now, np.inf
     for row in range(tables.states):
-        x, rate = lanes.now[tables.x + row, lane], lanes.now[tables.first + row, lane]
+        x, rate = now[tables.x + row, lane], now[tables.slopes + row, lane]
         if rate != 0.0:
-            step = min(step, 0.01 * (nominal[row] + abs(x)) / abs(rate))
+            step = min(step, 0.01 * (now[tables.nominal + row, lane] + abs(x)) / abs(rate))
+    now[tables.step, lane] = step
     for guard in range(tables.guards - tables.free, tables.guards):
-        lanes.sides[guard, lane] = 0.0
-        row = tables.seen + JET * (tables.extremes.shape[0] + guard)
-        for value in _jet(lanes.now, row, 1.0, 0.0, lane):
+        now[tables.sides + guard, lane] = 0.0
+        row = tables.sight + JET * (tables.extremes.shape[0] + guard)
+        for value in _jet(now, row, 1.0, 0.0, lane):
             if value != 0.0:
-                lanes.sides[guard, lane] = -np.sign(value)
+                now[tables.sides + guard, lane] = -np.sign(value)
                 break
-    return step
 
 
 @_compiled
-def _arrived(tables, course, lanes, lane, nominal, tolerance):  # type: ignore[no-untyped-def]
+def _arrived(tables, course, lanes, lane):  # type: ignore[no-untyped-def]
     """Whether a lane is done: it has met a guard in its last step, or is at its end."""
-    last = course.ends[lanes.variants[lane]]
-    met, end = NOTHING, lanes.now[tables.time, lane]
-    if lanes.close[lane]:
+    now, met = lanes.now, NOTHING
+    end, last, close = now[tables.time, lane], now[tables.end, lane], now[tables.close, lane] > 0
+    if close:
         _repeat(tables, lanes, lane)
         met, end = _first_met(tables, lanes, lane)
     if met == NOTHING:
-        if lanes.close[lane]:
-            _measure(tables, lanes, lanes.now, lane, lane, end)
+        if close:
+            _measure(tables, lanes, now, lane, lane, end)
         if end >= last:
-            _leave(tables, course, lanes, lanes.now, tables.x, lane, lane, end, THE_END)
+            _leave(tables, course, lanes, now, tables.x, lane, lane, end, THE_END)
         return end >= last
     _probe(tables, lanes.probe, end)
     if met >= tables.guards - tables.free:
-        end = _past(tables, lanes.probe, nominal, tolerance, last)
+        end = _past(tables, lanes.probe, last)
         _probe(tables, lanes.probe, end)
     there = lanes.probe.copy()
     _measure(tables, lanes, there, lane, 0, end)
@@ -437,41 +422,12 @@ def _arrived(tables, course, lanes, lane, nominal, tolerance):  # type: ignore[n
 
 
 @_compiled
-def _hopeless(tables, lanes, lane, end):  # type: ignore[no-untyped-def]
+def _hopeless(tables, now, lane, end):  # type: ignore[no-untyped-def]
     """Whether the steps of a lane have become too short, or so many are foreseen that it is better off alone."""
-    t, (step, start, count) = lanes.now[tables.time, lane], lanes.steps[:, lane]
-    gone = t - start
+    t, count = now[tables.time, lane], now[tables.count, lane]
+    gone = t - now[tables.begun, lane]
     slow = count > 4 * LANES and count * (gone + end - t) > MOST_STEPS * gone
-    return slow or (count > 0 and not step > 8 * EPS * abs(t))
-
-
-@_compiled
-def _accept(tables, course, lanes, longest, nominal):  # type: ignore[no-untyped-def]
-    """Make a step of all lanes, let those go on whose error is small enough, and set the lengths of the next ones."""
-    now, last = lanes.now, lanes.last
-    for lane in range(LANES):
-        variant, now[tables.size, lane] = lanes.variants[lane], 0.0
-        if variant >= 0:
-            if lanes.steps[0, lane] < 0:
-                lanes.steps[0, lane] = _begin(tables, lanes, lane, nominal)
-            lanes.steps[0, lane] = min(lanes.steps[0, lane], longest)
-            now[tables.size, lane] = min(lanes.steps[0, lane], course.ends[variant] - now[tables.time, lane])
-    run_at(tables.step, now, 0)
-    for lane in range(LANES):
-        variant, t, size = lanes.variants[lane], now[tables.time, lane], now[tables.size, lane]
-        error = now[tables.error, lane]
-        lanes.moved[lane] = variant >= 0 and error <= 1.0
-        if lanes.moved[lane]:
-            last[tables.time, lane], end = t, course.ends[variant]
-            now[tables.time, lane] = t + size if lanes.steps[0, lane] < end - t else end
-            for row in range(tables.moving):
-                last[tables.x + row, lane] = now[tables.x + row, lane]
-                now[tables.x + row, lane] = now[tables.new + row, lane]
-            for row in range(tables.seen, tables.seen + JET * (tables.extremes.shape[0] + tables.guards)):
-                last[row, lane] = now[row, lane]
-        factor = 0.85 / np.sqrt(np.sqrt(np.sqrt(error + 1e-30)))  # the error is of order 8
-        lanes.steps[0, lane] = size * (min(max(factor, 0.2), 5.0) if error >= 0 else np.nan)
-        lanes.steps[2, lane] += 1
+    return slow or (count > 0 and not now[tables.step, lane] > 8 * EPS * abs(t))
 
 
 @_compiled
@@ -484,35 +440,38 @@ def follow(tables, course, nominal, limits):  # type: ignore[no-untyped-def]
         nominal: (n,) sizes of the states.
         limits: (3,) the tolerance of a step, the longest step and the end of the motion, s.
     """
-    tolerance, longest, end = limits
-    extremes, shape = tables.extremes.shape[0], (tables.height, LANES)
     lanes = _Lanes(
-        np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros((LANES * JET, 10)),
-        np.zeros((tables.guards, LANES)), np.zeros((tables.guards, LANES)), np.zeros((extremes, LANES)),
-        np.zeros((extremes, LANES)), np.zeros(LANES, np.bool_), np.zeros(LANES, np.bool_), np.zeros((3, LANES)),
+        np.zeros((tables.height, LANES)),
+        np.zeros((tables.height, LANES)),
+        np.zeros((LANES * JET, 10)),
         np.full(LANES, -1),
-    )  # fmt: skip
+    )
+    now, variants, following, busy = lanes.now, lanes.variants, 0, True
+    now[tables.tolerance], now[tables.longest] = limits[0], limits[1]
     for row in range(tables.states):
-        lanes.now[row] = nominal[row]
-    lanes.now[tables.states] = tolerance
-    following, busy = 0, True
+        now[tables.nominal + row] = nominal[row]
     while busy:
-        _look(tables, lanes.now)
-        _compare(tables, lanes)
+        _look(tables, now)
+        run_at(tables.compare, now, 0)
         busy, loaded = False, False
         for lane in range(LANES):
-            variant = lanes.variants[lane]
-            at_end = variant >= 0 and lanes.now[tables.time, lane] >= course.ends[variant]
-            if lanes.moved[lane] and (lanes.close[lane] or at_end):
-                if _arrived(tables, course, lanes, lane, nominal, tolerance):
+            variant = variants[lane]
+            to_see = now[tables.close, lane] > 0 or now[tables.time, lane] >= now[tables.end, lane]
+            if now[tables.moved, lane] > 0 and to_see:
+                if _arrived(tables, course, lanes, lane):
                     variant = -1
-            elif variant >= 0 and _hopeless(tables, lanes, lane, end):
+            elif variant >= 0 and _hopeless(tables, now, lane, limits[2]):
                 variant = -1
             if variant < 0 and following < course.t.size:
                 variant, following, loaded = following, following + 1, True
                 _load(tables, course, lanes, lane, variant)
-            lanes.variants[lane] = variant
+            elif variant < 0:
+                now[tables.active, lane] = 0.0
+            variants[lane] = variant
             busy = busy or variant >= 0
         if loaded:
-            _look(tables, lanes.now)
-        _accept(tables, course, lanes, longest, nominal)
+            _look(tables, now)
+            for lane in range(LANES):
+                if now[tables.step, lane] < 0:
+                    _begin(tables, lanes, lane)
+        run_at(tables.advance, now, 0)

@@ -18,9 +18,10 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import CompileError
 from shaftwork.formulation.explicit_rows import Rows
+from shaftwork.numerics.hermite import JET
 from shaftwork.numerics.machine_code import LANES, LaneBody, lane_function, run_at
 from shaftwork.results.measures import EXTREMES, POWERS
-from shaftwork.sweep.lane_loops import LaneCourse, LaneTables, follow
+from shaftwork.sweep.lane_loops import ROWS, LaneCourse, LaneTables, follow
 from shaftwork.sweep.lane_step import STAGES, Judged, StepWriter
 
 OF_A_STEP, LOOSEST_TOLERANCE, TIGHTEST_TOLERANCE = 0.1, 1e-7, 1e-13
@@ -72,18 +73,20 @@ class LaneProgram:
         self._places = {x: ("y", k) for k, x in enumerate(rows.states)}
         self._places |= {symbol: ("p", k) for k, symbol in enumerate(rows.parameters)}
         self._places |= {part: ("p", len(rows.parameters) + k) for part, k in self._fixed.places.items()}
-        place = _rows(len(rows.states), moving, len(slopes), len(sight), len(rows.parameters) + len(self._fixed.places))
+        parameters = len(rows.parameters) + len(self._fixed.places)
+        watched = len(guards) + len(jumps)
+        place = _rows(len(rows.states), moving, len(slopes), len(sight), parameters, len(signs), watched)
         writer = partial(lane_function, rows=place)
         try:
             rates = writer(partial(self._write, values=slopes, definitions={}))
             jets = writer(partial(self._write, values=sight, definitions=motion.definitions))
             integrals = [(judged[quantity], power) for quantity, power in integrated]
-            step = writer(
-                StepWriter(
-                    rates.address, place["slopes"], len(slopes), len(rows.states), integrals, [*judged.values()]
-                )
-            )
-            self._code = rates, jets, step, writer(partial(self._write, values=points, definitions={}))
+            steps = StepWriter(
+                rates.address, place["slopes"], len(slopes), len(rows.states), integrals, [*judged.values()],
+                [sign for _, sign in signs], len(guards) + len(jumps),
+            )  # fmt: skip
+            functions = map(writer, (steps.probe, steps.advance, steps.compare))
+            self._code = (writer(partial(self._write, values=points, definitions={})), rates, jets, *functions)
         except NumbaError as error:
             raise CompileError(f"A law has no machine code: {error}") from error
         self.guards, self.free = len(guards), len(jumps)
@@ -91,13 +94,11 @@ class LaneProgram:
         self.integrated = [k for k, kind in enumerate(kinds) if kind in POWERS]
         """Which measures are integrals."""
         self._tables = LaneTables(
-            *(function.address for function in self._code[:3]),
-            height=place["end"],
+            *(function.address for function in self._code[1:]),
+            height=place["all"],
             states=len(rows.states),
             moving=moving,
-            **{name: place[name] for name in ("x", "time", "size", "high", "y", "moment", "new", "error", "p")},
-            first=place["slopes"],
-            seen=place["sight"],
+            **{name.replace(" ", "_"): place[name] for name in ROWS},
             guards=len(guards) + len(jumps),
             free=len(jumps),
             extremes=np.array([(n, k) for n, (k, _) in enumerate(signs)], dtype=np.int64).reshape(-1, 2),
@@ -137,15 +138,20 @@ class LaneProgram:
         """
         counts = [len(part) for part in self._parts.values()]
         values, tables = np.empty((sum(counts), t.size)), self._tables
-        _evaluate(self._code[3].address, tables.y, tables.moment, tables.p, tables.height, t, x, p, values)
+        _evaluate(self._code[0].address, tables.y, tables.moment, tables.p, tables.height, t, x, p, values)
         return dict(zip(self._parts, np.split(values, np.cumsum(counts)[:-1]), strict=True))
 
 
-def _rows(states: int, moving: int, slopes: int, sight: int, parameters: int) -> dict[str, int]:
+def _rows(
+    states: int, moving: int, slopes: int, sight: int, parameters: int, extremes: int, guards: int
+) -> dict[str, int]:
     """The first row of each array in the memory of a block, and their end."""
-    counts = {"nominal": states, "tolerance": 1, "x": moving, "time": 1, "size": 1, "high": 1, "y": moving}
-    counts |= {"moment": 1, "new": moving, "error": 1, "slopes": STAGES * slopes, "fifth": slopes, "third": slopes}
-    counts |= {"fifth of states": states, "third of states": states, "sight": sight, "p": parameters, "end": 0}
+    single = ("tolerance", "longest", "time", "size", "high", "moment", "end", "step", "active", "moved", "close")
+    counts = {"nominal": states, **dict.fromkeys((*single, "count", "last time", "begun"), 1)}
+    counts |= {"x": moving, "y": moving, "new": moving, "last x": moving, "slopes": STAGES * slopes}
+    counts |= {"fifth": slopes, "third": slopes, "fifth of states": states, "third of states": states}
+    counts |= {"sight": sight, "last sight": JET * (extremes + guards), "best": extremes, "lows": extremes}
+    counts |= {"sides": guards, "offsets": guards, "p": parameters, "all": 0}
     ends = np.cumsum([0, *counts.values()]).tolist()
     return dict(zip(counts, ends, strict=False))
 

@@ -1,4 +1,4 @@
-"""One step of lanes in machine code, with its error.
+"""Steps of lanes in machine code, with their errors, and where more than their ends has to be looked at.
 
 Dormand and Prince's method of order 8(5,3) compares its result with two of lower order: Hairer, Norsett, Wanner,
 Solving Ordinary Differential Equations I, II.10. What a step misses counts for the states, and for what is measured as
@@ -7,6 +7,7 @@ well: a stiff damper's torque may be wrong where the speeds are right, and what 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
@@ -15,6 +16,7 @@ from typing import Any
 from scipy.integrate import DOP853
 
 from shaftwork.codegen.array_form.elements import Array
+from shaftwork.numerics.hermite import BEYOND, JET
 from shaftwork.numerics.machine_code import LaneBody
 
 OF_A_QUANTITY, CANCELLED = 10.0, 1e-4
@@ -55,6 +57,8 @@ class StepWriter:
         states: how many there are; the integrals follow them, as quantities and powers.
         integrals: which of the judged quantities is integrated, and to which power.
         judged: quantities.
+        signs: of each quantity whose largest value is wanted; jets of these come first in the sight,
+        guards: and then those of so many guards.
     """
 
     def __init__(
@@ -65,25 +69,115 @@ class StepWriter:
         states: int,
         integrals: Sequence[tuple[Judged, int]],
         judged: Sequence[Judged],
+        signs: Sequence[float],
+        guards: int,
     ) -> None:
         self._slopes, self._first, self._count, self._states = slopes, first, count, states
         self._integrals, self._judged = integrals, judged
+        self._signs, self._guards = signs, guards
 
-    def __call__(self, body: LaneBody) -> None:
-        """Write it."""
-        self._body = body
-        moving, self._size = self._states + len(self._integrals), body.read("size", 0)
-        time, high = body.read("time", 0), body.read("high", 0)
-        for stage in range(1, STAGES):
-            self._move("y", DOP853.A[stage], moving)
-            moment = self._sum([time, self._product(body.number(DOP853.C[stage]), self._size)])
-            body.put("moment", 0, body.intrinsic("minnum", moment, high))
-            body.run(self._slopes, self._first + stage * self._count)
-        self._move("new", DOP853.B, moving)
+    def probe(self, body: LaneBody) -> None:
+        """Write a step of the given size, without its error."""
+        self._begin(body)
+        self._stages(body.read("size", 0))
+
+    def advance(self, body: LaneBody) -> None:
+        """Write a step that is made where its error is small enough, and the length of the next one."""
+        self._begin(body)
+        time, end = body.read("time", 0), body.read("end", 0)
+        wanted = body.intrinsic("minnum", body.read("step", 0), body.read("longest", 0))
+        left = self._difference(end, time)
+        body.put("size", 0, size := body.intrinsic("minnum", wanted, left))
+        self._stages(size)
         with body.loop(0, self._count) as row:
             for name, weights in (("fifth", DOP853.E5), ("third", DOP853.E3)):
                 body.put(name, 0, self._weighted(weights, row), row)
-        body.put("error", 0, self._error())
+        error = self._error()
+        build, one, zero = body.builder, body.number(1.0), body.number(0.0)
+        good = build.and_(build.fcmp_ordered("<=", error, one), build.fcmp_ordered(">", body.read("active", 0), zero))
+        arrived = build.select(build.fcmp_ordered("<", wanted, left), self._sum([time, size]), end)
+        body.put("last time", 0, build.select(good, time, body.read("last time", 0)))
+        body.put("time", 0, build.select(good, arrived, time))
+        self._where(good, "last x", "x", self._moving)
+        self._where(good, "x", "new", self._moving)
+        self._where(good, "last sight", "sight", self._jets)
+        body.put("moved", 0, build.select(good, one, zero))
+        body.put("count", 0, self._sum([body.read("count", 0), one]))
+        root = self._sum([error, body.number(TINY)])
+        for _ in range(3):  # the error is of order 8
+            root = body.intrinsic("sqrt", root)
+        factor = build.fdiv(body.number(0.85), root)
+        factor = body.intrinsic("minnum", body.intrinsic("maxnum", factor, body.number(0.2)), body.number(5.0))
+        number = build.fcmp_ordered("ord", error, error)
+        body.put("step", 0, build.select(number, self._product(size, factor), body.number(math.nan)))
+
+    def compare(self, body: LaneBody) -> None:
+        """Write the ends of the last steps into the extremes, and where more is to be looked at."""
+        self._begin(body)
+        build, zero = body.builder, body.number(0.0)
+        self._size = self._difference(body.read("time", 0), body.read("last time", 0))
+        moved, close = build.fcmp_ordered(">", body.read("moved", 0), zero), body.bit(value=False)
+        for guard in range(self._guards):
+            side, offset = body.read("sides", guard), body.read("offsets", guard)
+            left, right = (self._jet(name, len(self._signs) + guard, side) for name in ("last sight", "sight"))
+            left[0], right[0] = self._difference(left[0], offset), self._difference(right[0], offset)
+            above = build.fcmp_ordered(">", right[0], zero)
+            reaches = build.fcmp_ordered(">", self._sum(self._reach(left, right)), zero)
+            watched = build.fcmp_ordered("!=", side, zero)
+            close = build.or_(close, build.and_(watched, build.or_(above, reaches)))
+        for k, sign in enumerate(self._signs):
+            left, right = (self._jet(name, k, body.number(sign)) for name in ("last sight", "sight"))
+            higher, lower = (body.intrinsic(name, left[0], right[0]) for name in ("maxnum", "minnum"))
+            calm, best, low = build.and_(moved, build.not_(close)), body.read("best", k), body.read("lows", k)
+            best = build.select(calm, body.intrinsic("maxnum", best, higher), best)
+            body.put("best", k, best)
+            body.put("lows", k, build.select(calm, body.intrinsic("minnum", low, lower), low))
+            inside, beyond = self._reach(left, right)
+            rises = build.fcmp_ordered(">", inside, higher)
+            rises = build.and_(rises, build.fcmp_ordered(">", self._sum([inside, beyond]), best))
+            close = build.or_(close, rises)
+        body.put("close", 0, build.select(build.and_(moved, close), body.number(1.0), zero))
+
+    def _begin(self, body: LaneBody) -> None:
+        self._body = body
+        self._moving = self._states + len(self._integrals)
+        self._jets = JET * (len(self._signs) + self._guards)
+
+    def _where(self, good: Any, name: str, other: str, count: int) -> None:
+        """Write rows of another array into those of one where something holds."""
+        with self._body.loop(0, count) as row:
+            new, old = self._body.read(other, 0, row), self._body.read(name, 0, row)
+            self._body.put(name, 0, self._body.builder.select(good, new, old), row)
+
+    def _jet(self, name: str, number: int, sign: Any) -> list[Any]:
+        return [self._product(sign, self._body.read(name, JET * number + k)) for k in range(JET)]
+
+    def _reach(self, left: Sequence[Any], right: Sequence[Any]) -> tuple[Any, Any]:
+        """How high the quintic may come between two times, and how far the motion may be from it; see `hermite`."""
+        body, length = self._body, self._size
+        (fifth, tenth), square = (self._product(length, body.number(1 / k)) for k in (5, 2.5)), self._product(length, length)
+        twentieth, backward = self._product(square, body.number(1 / 20)), body.number(-1.0)
+        inside = [
+            self._sum([left[0], self._product(fifth, left[1])]),
+            self._sum([left[0], self._product(tenth, left[1]), self._product(twentieth, left[2])]),
+            self._difference(right[0], self._product(fifth, right[1])),
+            self._sum([right[0], self._product(backward, tenth, right[1]), self._product(twentieth, right[2])]),
+        ]
+        bend = self._product(square, self._sum([left[2], right[2]]), body.number(1 / 64))
+        apart = self._sum([self._product(length, self._difference(left[1], right[1]), body.number(1 / 32)), bend])
+        highest = reduce(lambda a, b: body.intrinsic("maxnum", a, b), inside)
+        return highest, self._product(body.number(BEYOND), body.intrinsic("fabs", apart))
+
+    def _stages(self, size: Any) -> None:
+        """Write the slopes at all stages but the first, and what they lead to at the end."""
+        body, self._size = self._body, size
+        time, high = body.read("time", 0), body.read("high", 0)
+        for stage in range(1, STAGES):
+            self._move("y", DOP853.A[stage], self._moving)
+            moment = self._sum([time, self._product(body.number(DOP853.C[stage]), size)])
+            body.put("moment", 0, body.intrinsic("minnum", moment, high))
+            body.run(self._slopes, self._first + stage * self._count)
+        self._move("new", DOP853.B, self._moving)
 
     def _move(self, name: str, weights: Array, moving: int) -> None:
         """Write states and integrals as slopes with weights move them."""
@@ -169,6 +263,9 @@ class StepWriter:
     def _sum(self, parts: Sequence[Any]) -> Any:
         build, zero = self._body.builder, self._body.number(0.0)
         return reduce(lambda a, b: build.fadd(a, b, flags=("contract",)), parts) if parts else zero
+
+    def _difference(self, one: Any, other: Any) -> Any:
+        return self._body.builder.fsub(one, other, flags=("contract",))
 
     def _product(self, *parts: Any) -> Any:
         return reduce(lambda a, b: self._body.builder.fmul(a, b, flags=("contract",)), parts)
