@@ -188,7 +188,13 @@ class _VariantCourse:
             lanes = lanes[[ensemble.starts_alike(column) for column in self.columns[:, lanes].T]]
         size = len(equations.code.model.states)
         return [
-            VariantGroup(ensemble.start, lanes, np.full(lanes.size, ensemble.span[0]), np.zeros((size, lanes.size)))
+            VariantGroup(
+                ensemble.start,
+                lanes,
+                np.full(lanes.size, ensemble.span[0]),
+                np.zeros((size, lanes.size)),
+                np.zeros(lanes.size),
+            )
         ]
 
     def _stretch(self, group: VariantGroup) -> list[VariantGroup]:
@@ -207,7 +213,7 @@ class _VariantCourse:
         for row, place in enumerate(program.integrated):
             self.values[place, group.lanes] += course.integrals[row]
         self.values[:, group.lanes] = np.where(self._extreme[:, None], course.best, self.values[:, group.lanes])
-        there, met = VariantGroup(group.modes, group.lanes, course.t, course.x), course.met
+        there, met = VariantGroup(group.modes, group.lanes, course.t, course.x, course.steps), course.met
         over = (met == THE_END) & (course.t >= self.ensemble.span[1])
         self._end(equations, there, p, over)
         onward = (met == THE_END) & ~over | (met >= program.guards)  # in the same modes
@@ -231,7 +237,19 @@ class _VariantCourse:
         integrals, best = np.zeros((len(program.integrated), count)), self.values[:, group.lanes]
         met = np.full(count, A_LIMIT)
         x, p = np.ascontiguousarray(group.x), np.ascontiguousarray(p)
-        return LaneCourse(begin, x.copy(), p, ends, highs, sides, offsets, integrals, np.ascontiguousarray(best), met)
+        return LaneCourse(
+            begin,
+            x.copy(),
+            p,
+            ends,
+            highs,
+            sides,
+            offsets,
+            integrals,
+            np.ascontiguousarray(best),
+            group.steps.copy(),
+            met,
+        )
 
     def _changed(self, before: EnsembleEquations, group: VariantGroup, guard: int) -> list[VariantGroup]:
         """Past a guard: what is stored goes over to the equations that follow, where it goes over unchanged."""
@@ -247,7 +265,7 @@ class _VariantCourse:
             for kind in after.code.kinds:
                 size = np.maximum(np.abs(old[kind]).max(axis=0, initial=0.0), 1.0)
                 same &= (np.abs(new[kind] - old[kind]) <= TYPED * size).all(axis=0)
-            groups.append(VariantGroup(modes, group.lanes[there], t, x).some(same))
+            groups.append(VariantGroup(modes, group.lanes[there], t, x, group.steps[there]).some(same))
         return groups
 
     def _end(self, equations: EnsembleEquations, group: VariantGroup, p: Array, over: Mask) -> None:

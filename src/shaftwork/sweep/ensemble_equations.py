@@ -161,16 +161,18 @@ class VariantGroup:
         lanes: (k,) numbers of the variants.
         t: (k,) s.
         x: (n, k) states.
+        steps: (k,) lengths of their last steps, s.
     """
 
     modes: ModeNames
     lanes: Index
     t: Array
     x: Array
+    steps: Array
 
     def some(self, on: Mask | Index) -> VariantGroup:
         """Those of the lanes (k,) that are marked, or those that are named."""
-        return VariantGroup(self.modes, self.lanes[on], self.t[on], self.x[:, on])
+        return VariantGroup(self.modes, self.lanes[on], self.t[on], self.x[:, on], self.steps[on])
 
 
 def joined(groups: Sequence[VariantGroup]) -> list[VariantGroup]:
@@ -185,6 +187,7 @@ def joined(groups: Sequence[VariantGroup]) -> list[VariantGroup]:
             np.concatenate([one.lanes for one in several]),
             np.concatenate([one.t for one in several]),
             np.concatenate([one.x for one in several], axis=1),
+            np.concatenate([one.steps for one in several]),
         )
         for modes, several in alike.items()
     ]

@@ -130,7 +130,9 @@ class GuardedEquations(EnsembleEquations):
         beyond = ((where > 0) | ((where == 0) & (turns >= 0))) & (self.sides != 0)[:, None]
         surely = beyond & ((where > 0) | (turns > 0))
         count, alone = beyond.sum(axis=0), np.where(surely.any(axis=0), surely.argmax(axis=0), A_LIMIT)
-        return PhaseEntry(np.where(count == 0, NOTHING, np.where(count == 1, alone, A_LIMIT)), clear_of_limit(excess, bands))
+        return PhaseEntry(
+            np.where(count == 0, NOTHING, np.where(count == 1, alone, A_LIMIT)), clear_of_limit(excess, bands)
+        )
 
     def _step(self, rates: Array) -> Array:
         """(k,) how far in s the further course is looked at; see `Regime.ahead`."""

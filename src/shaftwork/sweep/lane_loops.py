@@ -111,6 +111,7 @@ class LaneCourse(NamedTuple):
         offsets: (guards, k) how far beyond zero each has to go.
         integrals: (integrals, k); what is added to them.
         best: (rows, k) largest values so far.
+        steps: (k,) the length of the last step, which the next is tried with, s.
         met: (k,) guards, THE_END or A_LIMIT.
     """
 
@@ -123,6 +124,7 @@ class LaneCourse(NamedTuple):
     offsets: Array
     integrals: Array
     best: Array
+    steps: Array
     met: Index
 
 
@@ -172,26 +174,40 @@ def _reach(length, left, right):  # type: ignore[no-untyped-def]
 
 
 @_compiled
-def _peak(length, left, right):  # type: ignore[no-untyped-def]
-    """Share of the length and height of the highest peak of the quintic; -inf where there is none."""
+def _powers(length, left, right):  # type: ignore[no-untyped-def]
+    """Coefficients of the quintic, the highest first, in the share of the length; see `hermite`."""
     v0, v1, a0, a1 = length * left[1], length * right[1], length**2 * left[2], length**2 * right[2]
     rise = right[0] - left[0]
     c5, c4 = 6 * rise - 3 * (v0 + v1) - (a0 - a1) / 2, -15 * rise + 8 * v0 + 7 * v1 + (3 * a0 - 2 * a1) / 2
-    c3 = 10 * rise - 6 * v0 - 4 * v1 - (3 * a0 - a1) / 2
-    top, place, pieces = -np.inf, 0.0, 6
-    low, low_slope = 0.0, v0
+    return c5, c4, 10 * rise - 6 * v0 - 4 * v1 - (3 * a0 - a1) / 2, a0 / 2, v0, left[0]
+
+
+@_compiled
+def _root(powers, low, high, rising, most):  # type: ignore[no-untyped-def]
+    """A zero of a polynomial of degree 5 between two places: Newton's steps, halves where they leave the interval."""
+    c5, c4, c3, c2, c1, c0 = powers
+    u = (low + high) / 2
+    for _ in range(most):
+        value = ((((c5 * u + c4) * u + c3) * u + c2) * u + c1) * u + c0
+        slope = (((5 * c5 * u + 4 * c4) * u + 3 * c3) * u + 2 * c2) * u + c1
+        low, high = (low, u) if (value > 0) == rising else (u, high)
+        new = u - value / slope
+        u = new if low <= new <= high else (low + high) / 2
+    return u
+
+
+@_compiled
+def _peak(length, left, right):  # type: ignore[no-untyped-def]
+    """Share of the length and height of the highest peak of the quintic; -inf where there is none."""
+    c5, c4, c3, c2, c1, c0 = _powers(length, left, right)
+    slopes = (0.0, 5 * c5, 4 * c4, 3 * c3, 2 * c2, c1)
+    top, place, pieces, low, low_slope = -np.inf, 0.0, 6, 0.0, c1
     for k in range(1, pieces + 1):
         high = k / pieces
-        high_slope = (((5 * c5 * high + 4 * c4) * high + 3 * c3) * high + a0) * high + v0
+        high_slope = (((5 * c5 * high + 4 * c4) * high + 3 * c3) * high + 2 * c2) * high + c1
         if low_slope > 0 and high_slope < 0:
-            lower, upper, u = low, high, (low + high) / 2
-            for _ in range(5):
-                slope = (((5 * c5 * u + 4 * c4) * u + 3 * c3) * u + a0) * u + v0
-                bend = ((20 * c5 * u + 12 * c4) * u + 6 * c3) * u + a0
-                lower, upper = (u, upper) if slope > 0 else (lower, u)
-                new = u - slope / bend
-                u = new if lower <= new <= upper else (lower + upper) / 2
-            height = ((((c5 * u + c4) * u + c3) * u + a0 / 2) * u + v0) * u + left[0]
+            u = _root(slopes, low, high, False, 5)
+            height = ((((c5 * u + c4) * u + c3) * u + c2) * u + c1) * u + c0
             if height > top:
                 top, place = height, u
         low, low_slope = high, high_slope
@@ -307,7 +323,8 @@ def _first_met(tables, lanes, lane):  # type: ignore[no-untyped-def]
             value, upper = _top(tables, lanes, row, side, offset, 0.0, near, 1)
         if not value > 0:
             continue
-        guess = low + (upper - low) * left[0] / (left[0] - value)
+        share = (upper - low) / (high - low)
+        guess = low + (high - low) * _root(_powers(high - low, left, right), 0.0, share, True, 8)
         time = _rise(tables, lanes.probe, row, side, offset, low, upper, guess)
         if time < end or met == NOTHING:
             met, end = guard, time
@@ -365,7 +382,7 @@ def _load(tables, course, lanes, lane, variant):  # type: ignore[no-untyped-def]
 def _leave(tables, course, lanes, memory, x, lane, there, t, met):  # type: ignore[no-untyped-def]
     """Write where a variant has come to in a lane, from the row where its states stand, and what it has met."""
     variant = lanes.variants[lane]
-    course.met[variant], course.t[variant] = met, t
+    course.met[variant], course.t[variant], course.steps[variant] = met, t, lanes.now[tables.size, lane]
     for row in range(tables.moving):
         if row < tables.states:
             course.x[row, variant] = memory[x + row, there]
@@ -377,8 +394,8 @@ def _leave(tables, course, lanes, memory, x, lane, there, t, met):  # type: igno
 
 
 @_compiled
-def _begin(tables, lanes, lane):  # type: ignore[no-untyped-def]
-    """Set the first step, which changes no state by more than a hundredth of its size.
+def _begin(tables, lanes, lane, last):  # type: ignore[no-untyped-def]
+    """Set the first step: as the last one, in s, or such that no state changes by more than a hundredth of its size.
 
     A law's switch is met on the side on which its value is not, or to which it does not go.
     """
@@ -387,7 +404,7 @@ def _begin(tables, lanes, lane):  # type: ignore[no-untyped-def]
         x, rate = now[tables.x + row, lane], now[tables.slopes + row, lane]
         if rate != 0.0:
             step = min(step, 0.01 * (now[tables.nominal + row, lane] + abs(x)) / abs(rate))
-    now[tables.step, lane] = step
+    now[tables.step, lane] = max(step, last)
     for guard in range(tables.guards - tables.free, tables.guards):
         now[tables.sides + guard, lane] = 0.0
         row = tables.sight + JET * (tables.extremes.shape[0] + guard)
@@ -473,5 +490,5 @@ def follow(tables, course, nominal, limits):  # type: ignore[no-untyped-def]
             _look(tables, now)
             for lane in range(LANES):
                 if now[tables.step, lane] < 0:
-                    _begin(tables, lanes, lane)
+                    _begin(tables, lanes, lane, course.steps[variants[lane]])
         run_at(tables.advance, now, 0)

@@ -155,7 +155,10 @@ class StepWriter:
     def _reach(self, left: Sequence[Any], right: Sequence[Any]) -> tuple[Any, Any]:
         """How high the quintic may come between two times, and how far the motion may be from it; see `hermite`."""
         body, length = self._body, self._size
-        (fifth, tenth), square = (self._product(length, body.number(1 / k)) for k in (5, 2.5)), self._product(length, length)
+        (fifth, tenth), square = (
+            (self._product(length, body.number(1 / k)) for k in (5, 2.5)),
+            self._product(length, length),
+        )
         twentieth, backward = self._product(square, body.number(1 / 20)), body.number(-1.0)
         inside = [
             self._sum([left[0], self._product(fifth, left[1])]),
@@ -200,7 +203,9 @@ class StepWriter:
             for name in ("fifth", "third"):  # a state's own one is needed below
                 missed = body.read(name, 0, row)
                 body.put(f"{name} of states", 0, build.fdiv(self._product(missed, missed), allowed), row)
-        fifths, thirds = ([body.read(f"{name} of states", row) for row in range(self._states)] for name in ("fifth", "third"))
+        fifths, thirds = (
+            [body.read(f"{name} of states", row) for row in range(self._states)] for name in ("fifth", "third")
+        )
         for allowed, (fifth, third) in [*self._of_slopes(), *self._of_measured()]:
             fifths.append(build.fdiv(self._product(fifth, fifth), allowed))
             thirds.append(build.fdiv(self._product(third, third), allowed))
@@ -255,7 +260,9 @@ class StepWriter:
         """The change of a quantity with changes of the states, the first rows of an array."""
         read = self._body.read
         places = enumerate(quantity.columns)
-        return self._sum([self._product(read("sight", quantity.row + 1 + k), read(name, column)) for k, column in places])
+        return self._sum(
+            [self._product(read("sight", quantity.row + 1 + k), read(name, column)) for k, column in places]
+        )
 
     def _squares(self, parts: Sequence[Any]) -> Any:
         return self._sum([self._product(part, part) for part in parts])
