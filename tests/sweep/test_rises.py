@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from shaftwork.sweep.lane_steps import first_rises
 
 import shaftwork as sw
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.studies import sweep
-from shaftwork.sweep.lane_steps import first_rises
 
 
 def wave(phase: Array, level: Array, t: Array) -> Array:

@@ -7,7 +7,7 @@ import operator
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial, reduce
 from itertools import chain
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import sympy
@@ -132,7 +132,7 @@ class Terms:
         places: arrays in which states, parameters and what is fixed stand, and where.
     """
 
-    def __init__(self, body: Body, fixed: Fixed, places: Mapping[Basic, tuple[Literal["x", "p"], int]]) -> None:
+    def __init__(self, body: Body, fixed: Fixed, places: Mapping[Any, tuple[str, int]]) -> None:
         self._body, self._build, self._fixed, self._places = body, body.builder, fixed, places
         self._known: dict[Basic, Any] = {TIME: body.t}
 

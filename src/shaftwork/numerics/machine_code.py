@@ -6,7 +6,7 @@ import ctypes
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from llvmlite import ir
@@ -56,8 +56,8 @@ class Body:
         number = ir.Constant(ir.IntType(64), place)
         return self.builder.gep(self._data[array], [number if row is None else self.builder.add(row, number)])
 
-    def read(self, array: Literal["x", "p"], place: int, row: Any = None) -> Any:
-        """A number of an array, at a place behind the row of a loop if there is one."""
+    def read(self, array: str, place: int, row: Any = None) -> Any:
+        """A number of an array, x or p, at a place behind the row of a loop if there is one."""
         return self.builder.load(self._place(array, place, row))
 
     def write(self, place: int, value: Any, row: Any = None) -> None:
@@ -129,7 +129,7 @@ class LaneBody(Body):
 
     def intrinsic(self, name: str, *values: Any) -> Any:
         title, kind = f"llvm.{name}.v{LANES}f64", ir.FunctionType(self._kind, [self._kind] * len(values))
-        return self.builder.call(cgutils.get_or_insert_function(self.builder.module, kind, title), values)
+        return self.builder.call(self.builder.module.declare_intrinsic(title, (), kind), values)
 
     def call(self, function: Any, *values: Any) -> Any:
         result = self.number(0.0)

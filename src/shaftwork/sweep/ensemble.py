@@ -29,7 +29,7 @@ from shaftwork.sweep.ensemble_equations import (
     VariantGroup,
     joined,
 )
-from shaftwork.sweep.lane_loops import A_LIMIT, NOTHING, THE_END, LaneCourse
+from shaftwork.sweep.lane_tables import A_LIMIT, NOTHING, THE_END, LaneCourse
 
 
 class Ensemble:

@@ -17,8 +17,8 @@ from shaftwork.core.errors import CompileError
 from shaftwork.formulation.observables import Observables
 from shaftwork.pipeline.model import Model
 from shaftwork.results.measures import Measure
-from shaftwork.sweep.lane_loops import NOTHING
 from shaftwork.sweep.lane_program import lane_program
+from shaftwork.sweep.lane_tables import NOTHING
 
 Mask = NDArray[np.bool_]
 ModeNames = tuple[str, ...]

@@ -31,7 +31,7 @@ from shaftwork.sweep.ensemble_equations import (
     PhaseEntry,
     VariantGroup,
 )
-from shaftwork.sweep.lane_loops import A_LIMIT, NOTHING
+from shaftwork.sweep.lane_tables import A_LIMIT, NOTHING
 
 Course = tuple[Array, Array, Array, Array]
 """Times (k,), states (n, k), their rates, and guards (guards, k)."""

@@ -21,8 +21,9 @@ from shaftwork.formulation.explicit_rows import Rows
 from shaftwork.numerics.hermite import JET
 from shaftwork.numerics.machine_code import LANES, LaneBody, lane_function, run_at
 from shaftwork.results.measures import EXTREMES, POWERS
-from shaftwork.sweep.lane_loops import ROWS, LaneCourse, LaneTables, follow
+from shaftwork.sweep.lane_loops import follow
 from shaftwork.sweep.lane_step import STAGES, Judged, StepWriter
+from shaftwork.sweep.lane_tables import LaneCourse, LaneRows, LaneTables
 
 OF_A_STEP, LOOSEST_TOLERANCE, TIGHTEST_TOLERANCE = 0.1, 1e-7, 1e-13
 """The tolerance of a step as a part of that of the motion, and its bounds."""
@@ -53,57 +54,34 @@ class LaneProgram:
         stored: Sequence[Expr],
     ) -> None:
         self._parts = {"rates": rows.rates, "guards": tuple(guards), "shown": tuple(quantities), "stored": stored}
-        jumps = jumping(rows.states, (*rows.rates, *quantities))
-        signs = [(k, sign) for k, kind in enumerate(kinds) for sign in EXTREMES.get(kind, ())]
-        seen = [*(quantities[k] for k, _ in signs), *guards, *jumps]
-        integrated = [(quantities[k], POWERS[kind]) for k, kind in enumerate(kinds) if kind in POWERS]
-        blind = [one for one in dict.fromkeys(seen) if one.has(TIME)]
-        slopes = (*rows.rates, *(quantity**power for quantity, power in integrated), *blind)
-        motion, judged = _Motion(rows), dict[Expr, Judged]()
-        sight = [derivative for one in seen for derivative in motion.jet(one)]
-        moving = len(rows.states) + len(integrated)
-        for quantity in dict.fromkeys((*quantities, *blind)):
-            columns = tuple(k for k, x in enumerate(rows.states) if x in quantity.free_symbols)
-            slope_row = moving + blind.index(quantity) if quantity in blind else None
-            judged[quantity] = Judged(len(sight), columns, quantity in quantities, slope_row)
-            sight += [quantity, *(slope(quantity, rows.states[k]) for k in columns)]
+        seen = _Seen(rows, guards, quantities, kinds)
         points = [one for part in self._parts.values() for one in part]
-        expressions = (*slopes, *motion.definitions.values(), *sight, *points)
-        self._fixed = Fixed(rows.parameters, (*rows.states, TIME, *motion.definitions), expressions)
+        expressions = (*seen.slopes, *seen.motion.definitions.values(), *seen.sight, *points)
+        self._fixed = Fixed(rows.parameters, (*rows.states, TIME, *seen.motion.definitions), expressions)
         self._places = {x: ("y", k) for k, x in enumerate(rows.states)}
         self._places |= {symbol: ("p", k) for k, symbol in enumerate(rows.parameters)}
         self._places |= {part: ("p", len(rows.parameters) + k) for part, k in self._fixed.places.items()}
-        parameters = len(rows.parameters) + len(self._fixed.places)
-        watched = len(guards) + len(jumps)
-        place = _rows(len(rows.states), moving, len(slopes), len(sight), parameters, len(signs), watched)
-        writer = partial(lane_function, rows=place)
-        try:
-            rates = writer(partial(self._write, values=slopes, definitions={}))
-            jets = writer(partial(self._write, values=sight, definitions=motion.definitions))
-            integrals = [(judged[quantity], power) for quantity, power in integrated]
-            steps = StepWriter(
-                rates.address, place["slopes"], len(slopes), len(rows.states), integrals, [*judged.values()],
-                [sign for _, sign in signs], len(guards) + len(jumps),
-            )  # fmt: skip
-            functions = map(writer, (steps.probe, steps.advance, steps.compare))
-            self._code = (writer(partial(self._write, values=points, definitions={})), rates, jets, *functions)
-        except NumbaError as error:
-            raise CompileError(f"A law has no machine code: {error}") from error
-        self.guards, self.free = len(guards), len(jumps)
+        self.guards, self.free = len(guards), len(seen.jumps)
         """How many guards there are, and how many switches of laws behind them."""
         self.integrated = [k for k, kind in enumerate(kinds) if kind in POWERS]
         """Which measures are integrals."""
+        place = seen.rows(len(rows.parameters) + len(self._fixed.places))
+        write = partial(lane_function, rows=place._asdict())
+        try:
+            rates, jets, self._points = (
+                write(partial(self._write, values=values, definitions=definitions))
+                for values, definitions in ((seen.slopes, {}), (seen.sight, seen.motion.definitions), (points, {}))
+            )
+            steps = seen.steps(rates.address, place.slopes)
+            self._code = rates, jets, *map(write, (steps.probe, steps.advance, steps.compare))
+        except NumbaError as error:
+            raise CompileError(f"A law has no machine code: {error}") from error
+        addresses = {name: code.address for name, code in zip(LaneTables._fields, self._code, strict=False)}
         self._tables = LaneTables(
-            *(function.address for function in self._code[1:]),
-            height=place["all"],
-            states=len(rows.states),
-            moving=moving,
-            **{name.replace(" ", "_"): place[name] for name in ROWS},
-            guards=len(guards) + len(jumps),
-            free=len(jumps),
-            extremes=np.array([(n, k) for n, (k, _) in enumerate(signs)], dtype=np.int64).reshape(-1, 2),
-            signs=np.array([sign for _, sign in signs]),
-        )
+            **addresses, rows=place, states=len(rows.states), moving=seen.moving, guards=self.guards + self.free,
+            free=self.free, extremes=np.array([*enumerate(k for k, _ in seen.signs)], dtype=np.int64).reshape(-1, 2),
+            signs=np.array([sign for _, sign in seen.signs]),
+        )  # type: ignore[arg-type] # fmt: skip
 
     def _write(self, body: LaneBody, values: Sequence[Expr], definitions: Mapping[Dummy, Expr]) -> None:
         terms = Terms(body, self._fixed, self._places)
@@ -138,22 +116,54 @@ class LaneProgram:
         """
         counts = [len(part) for part in self._parts.values()]
         values, tables = np.empty((sum(counts), t.size)), self._tables
-        _evaluate(self._code[0].address, tables.y, tables.moment, tables.p, tables.height, t, x, p, values)
+        _evaluate(self._points.address, tables.rows, t, x, p, values)
         return dict(zip(self._parts, np.split(values, np.cumsum(counts)[:-1]), strict=True))
 
 
-def _rows(
-    states: int, moving: int, slopes: int, sight: int, parameters: int, extremes: int, guards: int
-) -> dict[str, int]:
-    """The first row of each array in the memory of a block, and their end."""
-    single = ("tolerance", "longest", "time", "size", "high", "moment", "end", "step", "active", "moved", "close")
-    counts = {"nominal": states, **dict.fromkeys((*single, "count", "last time", "begun"), 1)}
-    counts |= {"x": moving, "y": moving, "new": moving, "last x": moving, "slopes": STAGES * slopes}
-    counts |= {"fifth": slopes, "third": slopes, "fifth of states": states, "third of states": states}
-    counts |= {"sight": sight, "last sight": JET * (extremes + guards), "best": extremes, "lows": extremes}
-    counts |= {"sides": guards, "offsets": guards, "p": parameters, "all": 0}
-    ends = np.cumsum([0, *counts.values()]).tolist()
-    return dict(zip(counts, ends, strict=False))
+class _Seen:
+    """What is seen of a motion, and what of it is judged.
+
+    Args:
+        rows, guards, quantities, kinds: as for `LaneProgram`.
+    """
+
+    def __init__(self, rows: Rows, guards: Sequence[Expr], quantities: Sequence[Expr], kinds: Sequence[str]) -> None:
+        self.jumps = jumping(rows.states, (*rows.rates, *quantities))
+        self.signs = [(k, sign) for k, kind in enumerate(kinds) for sign in EXTREMES.get(kind, ())]
+        """Of extremes the measure and the sign."""
+        seen = [*(quantities[k] for k, _ in self.signs), *guards, *self.jumps]
+        self._watched, self._states = len(seen) - len(self.signs), len(rows.states)
+        integrated = [(quantities[k], POWERS[kind]) for k, kind in enumerate(kinds) if kind in POWERS]
+        self.moving = self._states + len(integrated)
+        blind = [one for one in dict.fromkeys(seen) if one.has(TIME)]
+        self.slopes = (*rows.rates, *(quantity**power for quantity, power in integrated), *blind)
+        self.motion, judged = _Motion(rows), dict[Expr, Judged]()
+        self.sight = [derivative for one in seen for derivative in self.motion.jet(one)]
+        for quantity in dict.fromkeys((*quantities, *blind)):
+            columns = tuple(k for k, x in enumerate(rows.states) if x in quantity.free_symbols)
+            row = self.moving + blind.index(quantity) if quantity in blind else None
+            judged[quantity] = Judged(len(self.sight), columns, quantity in quantities, row)
+            self.sight += [quantity, *(slope(quantity, rows.states[k]) for k in columns)]
+        self._judged, self._integrals = judged, [(judged[quantity], power) for quantity, power in integrated]
+
+    def steps(self, rates: int, first: int) -> StepWriter:
+        """What makes steps, with the address of the slopes and their first row."""
+        signs = [sign for _, sign in self.signs]
+        return StepWriter(
+            rates, first, len(self.slopes), self._states, self._integrals, [*self._judged.values()], signs,
+            self._watched,
+        )  # fmt: skip
+
+    def rows(self, parameters: int) -> LaneRows:
+        """Where all arrays stand, one behind the other, with so many parameters; the others have one row."""
+        states, moving, slopes, extremes, watched = (
+            self._states, self.moving, len(self.slopes), len(self.signs), self._watched,
+        )  # fmt: skip
+        sizes = {"nominal": states, "x": moving, "y": moving, "new": moving, "last_x": moving}
+        sizes |= {"slopes": STAGES * slopes, "fifth": slopes, "third": slopes, "fifths": states, "thirds": states}
+        sizes |= {"sight": len(self.sight), "last_sight": JET * (extremes + watched), "best": extremes}
+        sizes |= {"lows": extremes, "sides": watched, "offsets": watched, "p": parameters}
+        return LaneRows(*np.cumsum([0, *(sizes.get(name, 1) for name in LaneRows._fields[:-1])]).tolist())
 
 
 def lane_program(
@@ -201,18 +211,18 @@ class _Motion:
 
 
 @njit(error_model="numpy", cache=True)
-def _evaluate(function, y, moment, first, height, t, x, p, values):  # type: ignore[no-untyped-def]
+def _evaluate(function, rows, t, x, p, values):  # type: ignore[no-untyped-def]
     """Write the values (rows, k) of a function at times (k,), states (n, k) and parameters (parameters, k)."""
-    memory = np.zeros((height + values.shape[0], LANES))
+    memory = np.zeros((rows.height + values.shape[0], LANES))
     for start in range(0, t.size, LANES):
         for lane in range(LANES):
             variant = min(start + lane, t.size - 1)
-            memory[moment, lane] = t[variant]
+            memory[rows.moment, lane] = t[variant]
             for row in range(x.shape[0]):
-                memory[y + row, lane] = x[row, variant]
+                memory[rows.y + row, lane] = x[row, variant]
             for row in range(p.shape[0]):
-                memory[first + row, lane] = p[row, variant]
-        run_at(function, memory, height)
+                memory[rows.p + row, lane] = p[row, variant]
+        run_at(function, memory, rows.height)
         for lane in range(min(LANES, t.size - start)):
             for row in range(values.shape[0]):
-                values[row, start + lane] = memory[height + row, lane]
+                values[row, start + lane] = memory[rows.height + row, lane]

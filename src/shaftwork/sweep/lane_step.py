@@ -96,13 +96,13 @@ class StepWriter:
         build, one, zero = body.builder, body.number(1.0), body.number(0.0)
         good = build.and_(build.fcmp_ordered("<=", error, one), build.fcmp_ordered(">", body.read("active", 0), zero))
         arrived = build.select(build.fcmp_ordered("<", wanted, left), self._sum([time, size]), end)
-        body.put("last time", 0, build.select(good, time, body.read("last time", 0)))
+        body.put("last_time", 0, build.select(good, time, body.read("last_time", 0)))
         body.put("time", 0, build.select(good, arrived, time))
-        self._where(good, "last x", "x", self._moving)
+        self._where(good, "last_x", "x", self._moving)
         self._where(good, "x", "new", self._moving)
-        self._where(good, "last sight", "sight", self._jets)
+        self._where(good, "last_sight", "sight", self._jets)
         body.put("moved", 0, build.select(good, one, zero))
-        body.put("count", 0, self._sum([body.read("count", 0), one]))
+        body.put("made", 0, self._sum([body.read("made", 0), one]))
         root = self._sum([error, body.number(TINY)])
         for _ in range(3):  # the error is of order 8
             root = body.intrinsic("sqrt", root)
@@ -115,18 +115,18 @@ class StepWriter:
         """Write the ends of the last steps into the extremes, and where more is to be looked at."""
         self._begin(body)
         build, zero = body.builder, body.number(0.0)
-        self._size = self._difference(body.read("time", 0), body.read("last time", 0))
+        self._size = self._difference(body.read("time", 0), body.read("last_time", 0))
         moved, close = build.fcmp_ordered(">", body.read("moved", 0), zero), body.bit(value=False)
         for guard in range(self._guards):
             side, offset = body.read("sides", guard), body.read("offsets", guard)
-            left, right = (self._jet(name, len(self._signs) + guard, side) for name in ("last sight", "sight"))
+            left, right = (self._jet(name, len(self._signs) + guard, side) for name in ("last_sight", "sight"))
             left[0], right[0] = self._difference(left[0], offset), self._difference(right[0], offset)
             above = build.fcmp_ordered(">", right[0], zero)
             reaches = build.fcmp_ordered(">", self._sum(self._reach(left, right)), zero)
             watched = build.fcmp_ordered("!=", side, zero)
             close = build.or_(close, build.and_(watched, build.or_(above, reaches)))
         for k, sign in enumerate(self._signs):
-            left, right = (self._jet(name, k, body.number(sign)) for name in ("last sight", "sight"))
+            left, right = (self._jet(name, k, body.number(sign)) for name in ("last_sight", "sight"))
             higher, lower = (body.intrinsic(name, left[0], right[0]) for name in ("maxnum", "minnum"))
             calm, best, low = build.and_(moved, build.not_(close)), body.read("best", k), body.read("lows", k)
             best = build.select(calm, body.intrinsic("maxnum", best, higher), best)
@@ -202,10 +202,8 @@ class StepWriter:
             allowed = self._squares([body.read("x", 0, row), body.read("nominal", 0, row), change])
             for name in ("fifth", "third"):  # a state's own one is needed below
                 missed = body.read(name, 0, row)
-                body.put(f"{name} of states", 0, build.fdiv(self._product(missed, missed), allowed), row)
-        fifths, thirds = (
-            [body.read(f"{name} of states", row) for row in range(self._states)] for name in ("fifth", "third")
-        )
+                body.put(f"{name}s", 0, build.fdiv(self._product(missed, missed), allowed), row)
+        fifths, thirds = ([body.read(f"{name}s", row) for row in range(self._states)] for name in ("fifth", "third"))
         for allowed, (fifth, third) in [*self._of_slopes(), *self._of_measured()]:
             fifths.append(build.fdiv(self._product(fifth, fifth), allowed))
             thirds.append(build.fdiv(self._product(third, third), allowed))
@@ -224,7 +222,8 @@ class StepWriter:
             allowed = self._sum([self._squares([body.read("x", row)]), self._product(square, beside)])
             parts.append((allowed, (body.read("fifth", row), body.read("third", row))))
         for quantity in self._judged:
-            if (row := quantity.blind) is not None:
+            if quantity.blind is not None:
+                row = quantity.blind
                 beside = self._sum([self._mean(row), self._least(quantity)])
                 allowed = self._product(body.number(OF_A_QUANTITY**2), square, beside)
                 parts.append((allowed, (body.read("fifth", row), body.read("third", row))))
