@@ -62,7 +62,7 @@ class Ensemble:
         self._equations: dict[ModeNames, EnsembleEquations | str] = {}
         self._codes: dict[Model, EnsembleCode] = {}
         self._refuse()
-        self.start = self._first_modes(first)
+        self.start = self._settled(first)
         """The modes in which the first variant starts."""
         if self.equations(self.start) is None:
             raise CompileError(self._equations[self.start])
@@ -98,12 +98,16 @@ class Ensemble:
         return np.asarray(same)
 
     def _first_modes(self, values: Mapping[str, float]) -> ModeNames:  # noqa: ARG002
-        """The modes in which a variant starts."""
+        """The modes in which a variant is before anything has moved."""
         return ()
+
+    def _settled(self, values: Mapping[str, float]) -> ModeNames:
+        """The modes that go on where a variant starts."""
+        return self._first_modes(values)
 
     def starts_alike(self, column: Array) -> bool:
         """Whether the values (names,) of the parameters that vary leave the modes at the start as they are."""
-        return self._first_modes(dict(zip(self.names, column.tolist(), strict=True))) == self.start
+        return self._first_modes(dict(zip(self.names, column.tolist(), strict=True))) == self._first_modes(self.first)
 
     def equations(self, modes: ModeNames) -> EnsembleEquations | None:
         """The equations of a combination of modes, or None where variants cannot run side by side in them."""

@@ -18,6 +18,7 @@ from shaftwork.hybrid.consistency import (
     time_scales,
 )
 from shaftwork.hybrid.equation_sets import EquationSets
+from shaftwork.hybrid.event_iteration import EventIteration
 from shaftwork.hybrid.hybrid_model import HybridModel
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
 from shaftwork.hybrid.modes.mode_machines import with_modes
@@ -47,6 +48,11 @@ class HybridEnsemble(Ensemble):
     def _first_modes(self, values: Mapping[str, float]) -> ModeNames:
         equations, p = self._equation_sets.first_equations(values)
         return equations.first_modes(self.span[0], np.zeros(len(equations.model.states)), p)
+
+    def _settled(self, values: Mapping[str, float]) -> ModeNames:
+        equations, _ = self._equation_sets.first_equations(values)
+        events = EventIteration(self._equation_sets, values, self.span)
+        return events.started(self.span[0], np.zeros(len(equations.model.states))).regime.modes
 
     def _equations_in(self, modes: ModeNames) -> EnsembleEquations:
         equations = self._equation_sets.of(modes)
@@ -127,12 +133,10 @@ class GuardedEquations(EnsembleEquations):
             drifts = drift(side * (here[3] - now), side * (beside[3] - near), bands)
             turns = np.where(turns == 0, drifts, turns)
         where = side_of_limit(excess, bands)
-        beyond = ((where > 0) | ((where == 0) & (turns >= 0))) & (self.sides != 0)[:, None]
-        surely = beyond & ((where > 0) | (turns > 0))
-        count, alone = beyond.sum(axis=0), np.where(surely.any(axis=0), surely.argmax(axis=0), A_LIMIT)
-        return PhaseEntry(
-            np.where(count == 0, NOTHING, np.where(count == 1, alone, A_LIMIT)), clear_of_limit(excess, bands)
-        )
+        beyond = ((where > 0) | ((where == 0) & (turns > 0))) & (self.sides != 0)[:, None]
+        count = beyond.sum(axis=0)
+        met = np.where(count == 0, NOTHING, np.where(count == 1, beyond.argmax(axis=0), A_LIMIT))
+        return PhaseEntry(met, clear_of_limit(excess, bands))
 
     def _step(self, rates: Array) -> Array:
         """(k,) how far in s the further course is looked at; see `Regime.ahead`."""

@@ -81,7 +81,7 @@ class LaneProgram:
             **addresses, rows=place, states=len(rows.states), moving=seen.moving, guards=self.guards + self.free,
             free=self.free, extremes=np.array([*enumerate(k for k, _ in seen.signs)], dtype=np.int64).reshape(-1, 2),
             signs=np.array([sign for _, sign in seen.signs]),
-        )  # type: ignore[arg-type] # fmt: skip
+        )  # fmt: skip
 
     def _write(self, body: LaneBody, values: Sequence[Expr], definitions: Mapping[Dummy, Expr]) -> None:
         terms = Terms(body, self._fixed, self._places)
