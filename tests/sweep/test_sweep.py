@@ -83,7 +83,7 @@ def test_measures_equal_closed_forms(count: int) -> None:
 
 @pytest.mark.slow
 def test_16_variants_of_the_crane_agree_with_scipy() -> None:
-    pytest.importorskip("heyoka")
+    pytest.importorskip("numba")
     samples = {name: values[:16] for name, values in crane_samples().items()}
     fast = sweep(sw.scenes.crane_start(), samples=samples, t_end=0.7, measures=MEASURES)
     slow = sweep(sw.scenes.crane_start(), samples=samples, t_end=0.7, measures=MEASURES, engine="scipy", rtol=1e-10)
@@ -96,7 +96,7 @@ def test_16_variants_of_the_crane_agree_with_scipy() -> None:
 
 @pytest.mark.slow
 def test_variants_side_by_side_are_those_of_any_order_and_grouping() -> None:
-    pytest.importorskip("heyoka")
+    pytest.importorskip("numba")
     worker = crane_worker()
     assert worker.why == ""
     whole = worker.run(np.arange(24))
@@ -109,7 +109,7 @@ def test_variants_side_by_side_are_those_of_any_order_and_grouping() -> None:
 
 @pytest.mark.slow
 def test_variants_with_a_gap_and_a_brake_change_their_modes_each_at_its_own_time() -> None:
-    pytest.importorskip("heyoka")
+    pytest.importorskip("numba")
     net = sw.Network("gap and brake")
     net.add(sw.TorqueSource("motor", tau=100.0), "rotor")
     net.add(sw.Inertia("J1", J=27.35), "rotor")
@@ -132,7 +132,7 @@ def test_variants_with_a_gap_and_a_brake_change_their_modes_each_at_its_own_time
 
 def test_torques_at_both_ends_of_a_mesh_are_those_of_single_runs() -> None:
     """At the second end the last spring gives what the node takes: the same sign as at the first."""
-    pytest.importorskip("heyoka")
+    pytest.importorskip("numba")
     net = sw.Network("meshed")
     net.add(sw.TorqueSource("motor", tau=5 * sw.t), "a")
     net.add(sw.Inertia("J1", J=0.5), "a")
@@ -149,7 +149,7 @@ def test_torques_at_both_ends_of_a_mesh_are_those_of_single_runs() -> None:
 
 def test_variants_of_a_gear_before_a_gap_run_side_by_side() -> None:
     """The speed behind the gear, which goes on over each contact, is read by the ratio of its variant."""
-    pytest.importorskip("heyoka")
+    pytest.importorskip("numba")
     net = sw.Network("geared gap")
     net.add(sw.TorqueSource("motor", tau=100.0), "m")
     net.add(sw.Inertia("J0", J=2.0), "m")
@@ -167,7 +167,7 @@ def test_variants_of_a_gear_before_a_gap_run_side_by_side() -> None:
 
 
 def test_what_runs_side_by_side_runs_one_by_one_where_it_must() -> None:
-    pytest.importorskip("heyoka")
+    pytest.importorskip("numba")
     stiffness, damping = np.linspace(500.0, 900.0, 16), np.full(16, 2.0)
     damping[3] = 0.0  # has other equations
     made = sweep(swing(1.0), samples={"shaft.c": stiffness, "shaft.d": damping}, t_end=1.0, measures=["max shaft.tau"])
@@ -386,7 +386,7 @@ def test_processes_give_the_same() -> None:
 @pytest.mark.slow
 def test_the_largest_torque_of_a_motor_is_its_pull_out_torque_to_1e_8() -> None:
     """Shafts of many kinds make the slip pass that of the pull-out torque once or, swinging, several times."""
-    pytest.importorskip("heyoka")
+    pytest.importorskip("numba")
     random, count = np.random.default_rng(3), 400
     samples = {
         "shaft.c": 24206.0 * random.uniform(0.5, 1.5, count),
@@ -401,7 +401,7 @@ def test_the_largest_torque_of_a_motor_is_its_pull_out_torque_to_1e_8() -> None:
 @pytest.mark.slow
 def test_a_guard_that_is_met_just_after_a_sample_leaves_extremes_right() -> None:
     """A clutch closes at 1 s, within rounding of a sample: from there to the guard it is 1e-14 s."""
-    pytest.importorskip("heyoka")
+    pytest.importorskip("numba")
     net = sw.Network("clutch")
     net.add(sw.TorqueSource("motor", tau=100.0), "a")
     net.add(sw.Inertia("J1", J=27.0), "a")

@@ -10,7 +10,7 @@ from scipy.linalg import expm
 import shaftwork as sw
 from shaftwork.studies import sweep
 
-pytest.importorskip("heyoka")
+pytest.importorskip("numba")
 
 COUNT, T_END = 16, 10.0
 

@@ -93,37 +93,19 @@ def test_what_must_be_whole_is_refused_wherever_it_is_not(values: Any) -> None:
         sw.studies.sweep(net, {"m.pole_pairs": values}, t_end=0.1, measures=["end J.omega"])
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("torque", "load", "why"),
-    [
-        (
-            100 * sympy.exp(-((10 * sw.t - 3) ** 2)),
-            sw.Damper("load", d=0.1),
-            "a law fades to a constant, as exp and tanh do",
-        ),
-        (
-            4 * sympy.sin(10 * sw.t),
-            sw.CoulombLoad("load", tau=3.0),
-            "a limit at which a mode ends changes with the time by itself",
-        ),
-        (4 * sympy.Heaviside(sw.omega - 1), sw.Damper("load", d=0.1), "a law or a quantity switches by a condition"),
-    ],
-)
-def test_why_is_the_cause_in_the_equations_at_the_start(torque: sympy.Expr, load: sw.Component, why: str) -> None:
-    pytest.importorskip("heyoka")
+def test_why_names_the_cause() -> None:
     net = sw.Network("start")
-    net.add(sw.TorqueSource("motor", tau=torque), "a")
-    net.add(sw.Inertia("J", J=1.0), "a")
-    net.add(load, "a")
+    net.add(sw.SpeedSource("motor", omega=sympy.sin(sw.t)), "a")
+    net.add(sw.Spring("shaft", c=100.0, d=0.1), "a", "b")
+    net.add(sw.Inertia("J", J=1.0), "b")
     made = sw.studies.sweep(net, {"J.J": np.linspace(1.0, 2.0, 16)}, t_end=0.1, measures=["end J.omega"])
-    assert made.why.startswith(why)
+    assert made.why.startswith("a speed is prescribed")
 
 
 @pytest.mark.slow
 def test_what_hardly_moves_is_known_with_a_smaller_tolerance() -> None:
     """A linear motion is proportional to its load; the absolute tolerance, that of 0.001 rad/s, is not."""
-    pytest.importorskip("heyoka")
+    pytest.importorskip("numba")
 
     def peaks(size: float) -> np.ndarray:
         net = train(sw.Damper("d", d=0.2))

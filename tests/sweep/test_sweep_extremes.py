@@ -9,7 +9,7 @@ import sympy
 import shaftwork as sw
 from shaftwork.studies import sweep
 
-pytest.importorskip("heyoka")
+pytest.importorskip("numba")
 
 ALONE = 8
 """Variants that are too few to run side by side."""

@@ -110,7 +110,7 @@ def test_a_store_of_another_version_is_refused(whole: Path, tmp_path: Path) -> N
 
 
 def test_variants_that_are_stored_twice_count_once(tmp_path: Path) -> None:
-    pytest.importorskip("heyoka")
+    pytest.importorskip("numba")
     net = sw.Network("swing")
     net.add(sw.TorqueSource("motor", tau=5.0), "a")
     net.add(sw.Inertia("J", J=1.0), "a")
