@@ -137,7 +137,7 @@ class _Seen:
         self.moving = self._states + len(integrated)
         blind = [one for one in dict.fromkeys(seen) if one.has(TIME)]
         self.slopes = (*rows.rates, *(quantity**power for quantity, power in integrated), *blind)
-        self.motion, judged = _Motion(rows), dict[Expr, Judged]()
+        self.motion, judged = _Derivatives(rows), dict[Expr, Judged]()
         self.sight = [derivative for one in seen for derivative in self.motion.jet(one)]
         for quantity in dict.fromkeys((*quantities, *blind)):
             columns = tuple(k for k, x in enumerate(rows.states) if x in quantity.free_symbols)
@@ -177,7 +177,7 @@ def lane_program(
 _programs = BoundedCache[tuple[object, ...], LaneProgram](KEPT)
 
 
-class _Motion:
+class _Derivatives:
     """Derivatives by time along a motion.
 
     Args:
