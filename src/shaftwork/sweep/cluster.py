@@ -39,8 +39,8 @@ def on_cluster(worker: Worker, task: Task, variants: Index, client: Any) -> Iter
     distributed = imported("distributed", "cluster", "sweep(on=...)")
     if not isinstance(client, distributed.Client):
         raise ParameterError(f"on = {client!r} must be a client of Dask: distributed.Client(...).")
-    if client.asynchronous:
-        raise ParameterError("on = a client with asynchronous=True cannot be waited for. Leave that out.")
+    if client.asynchronous or client.status == "closed":
+        raise ParameterError(f"on = {client!r} is asynchronous or closed. Give one that is open and can be waited for.")
     calls = _Calls(worker, task, variants, client, distributed)
     try:
         while calls.submit():
@@ -69,7 +69,9 @@ class _Calls:
     def __init__(self, worker: Worker, task: Task, variants: Index, client: Any, distributed: Any) -> None:
         self._task, self._client, self._distributed = task, client, distributed
         try:  # as bytes, which only workers unpack
-            head = distributed.protocol.pickle.dumps(replace(task, columns=task.rows(slice(0, SIDE_BY_SIDE))))
+            head = imported("cloudpickle", "cluster", "sweep(on=...)").dumps(
+                replace(task, columns=task.rows(slice(0, SIDE_BY_SIDE)))
+            )
         except (pickle.PicklingError, TypeError, AttributeError) as error:
             raise ParameterError(
                 f"A measure cannot be sent to a cluster: {error}. Give a function of a file."
@@ -77,7 +79,7 @@ class _Calls:
         self._head = head, libraries(), worker.why
         self._rest = parted(variants, 8 * worker.chunk)[::-1]
         self._done: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._room, self._looked, self._busy = 0, -np.inf, time.monotonic()
+        self._each, self._room, self._looked, self._busy, self._told = 2, 0, -np.inf, time.monotonic(), False
         self.waiting: dict[Any, Index] = {}
         """Variants by future."""
 
@@ -85,20 +87,29 @@ class _Calls:
         """Send as much as keeps the cluster busy, which may grow meanwhile; whether anything waits."""
         if (now := time.monotonic()) > self._looked + 1.0:
             threads = sum(self._client.nthreads().values())
-            self._room, self._looked = 2 * max(1, threads), now
+            self._room, self._looked = self._each * max(1, threads), now
             self._busy = now if threads else self._busy
-        if now > self._busy + 60.0:
-            warn(
-                "The cluster has had no workers for a minute: the sweep waits for them. Look at their logs.",
-                UserWarning,
-            )
-            self._busy = np.inf
+            self._say_idle(now - self._busy)
         while self._rest and len(self.waiting) < self._room:
             variants = self._rest.pop()
             future = self._client.submit(measured, *self._head, variants, self._task.rows(variants), pure=False)
             self.waiting[future] = variants
             future.add_done_callback(self._done.put)
         return bool(self.waiting)
+
+    def _say_idle(self, idle: float) -> None:
+        """What is said where there have been no workers for a time in s.
+
+        Raises:
+            SimulationError: there will be none.
+        """
+        text = "The cluster has had no workers for {} minutes. Their logs tell why."
+        local = self._client.cluster is None or isinstance(self._client.cluster, self._distributed.LocalCluster)
+        if idle > 600.0 and local:  # others may be waiting in a queue
+            raise SimulationError(f"{text.format(10)} What a store has is kept, and the same call goes on from there.")
+        if idle > 60.0 and not self._told:
+            self._told = True
+            warn(f"{text.format('some')} The sweep waits for them.", UserWarning)
 
     def next(self) -> list[Chunk]:
         """Chunks of a call that is done; none where none is within a second."""
@@ -115,7 +126,8 @@ class _Calls:
                     f"Workers of the cluster were lost again and again with variant {variants[0]}: {error}. Their logs "
                     "tell why; memory is the most common reason."
                 ) from None
-            self._rest += [part for part in np.array_split(variants, 2) if part.size]  # halves take less of everything
+            self._each = 1  # Dask blames all that waits at a worker; parts take less time and memory
+            self._rest += [part for part in np.array_split(variants, 8) if part.size]
             return []
         except self._distributed.client.FutureCancelledError:  # with a scheduler that may come again
             self._rest.append(variants)
