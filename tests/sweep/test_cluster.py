@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import shaftwork as sw
+from shaftwork.sweep.cluster import libraries, measured
 
 distributed = pytest.importorskip("distributed")
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]  # of the cluster, about workers that are lost
@@ -83,6 +84,55 @@ def test_workers_that_are_killed_lose_nothing(client: Any, tmp_path: Path) -> No
     one = sw.studies.sweep(sw.scenes.crane_start(), processes=1, **call)
     for name in MEASURES:
         assert one.measures[name].tobytes() == many.measures[name].tobytes() == again.measures[name].tobytes()
+
+
+def test_a_variant_at_which_workers_die_is_named(client: Any) -> None:
+    def ends_its_process(solution: sw.Solution) -> float:
+        if solution["J1.omega"][-1] > 1.0:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return 0.0
+
+    with pytest.raises(sw.SimulationError, match=r"lost again and again with variant 0: .* memory is the most common"):
+        sw.studies.sweep(
+            sw.scenes.crane_start(), {"shaft.c": [2e4]}, t_end=2.0, measures={"a": ends_its_process}, on=client
+        )
+
+
+def test_a_worker_with_other_libraries_is_refused() -> None:
+    expected = {**libraries(), "numpy": "1.0"}
+    with pytest.raises(sw.SimulationError, match=rf"A worker of the cluster has numpy {np.__version__} for 1\.0"):
+        measured(b"", expected, "", np.arange(3), {})
+
+
+def test_a_measure_that_cannot_be_sent_is_refused(client: Any) -> None:
+    lock = threading.Lock()
+
+    def locked(_: sw.Solution) -> float:
+        return float(lock.locked())
+
+    with pytest.raises(sw.ParameterError, match="A measure cannot be sent to a cluster: cannot pickle"):
+        sw.studies.sweep(sw.scenes.crane_start(), {"shaft.c": [2e4]}, t_end=0.1, measures={"a": locked}, on=client)
+
+
+def test_a_client_that_is_closed_is_refused(client: Any) -> None:
+    closed = distributed.Client(client.scheduler.address)
+    closed.close()
+    with pytest.raises(sw.ParameterError, match="is asynchronous or closed"):
+        sw.studies.sweep(sw.scenes.crane_start(), {"shaft.c": [2e4]}, t_end=0.1, measures=MEASURES, on=closed)
+
+
+def test_a_scheduler_that_vanishes_is_an_error() -> None:
+    with (
+        distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.Client(cluster.scheduler_address, timeout=3) as client,
+    ):
+        end = threading.Timer(2.0, cluster.close)
+        end.start()
+        with pytest.raises(sw.SimulationError, match="scheduler of the cluster does not answer any more"):
+            sw.studies.sweep(
+                sw.scenes.crane_start(), samples=samples(200_000), t_end=100.0, measures=MEASURES, on=client
+            )
+        end.join()
 
 
 def test_what_is_no_client_is_refused() -> None:

@@ -2,94 +2,209 @@
 
 from __future__ import annotations
 
+import ctypes
+import pickle
+import queue
+import sys
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+import time
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from importlib import metadata
 from typing import Any
-from uuid import uuid4
 
-from shaftwork.core.errors import ParameterError, SimulationError, imported
+import numpy as np
+
+from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError, imported
+from shaftwork.core.notices import warn
 from shaftwork.results.observer import Array
-from shaftwork.sweep.sweep_task import SIDE_BY_SIDE, Chunk, Index, Task, Worker
+from shaftwork.sweep.sweep_task import SIDE_BY_SIDE, Chunk, Index, Task, Worker, parted
 
-_workers: dict[str, Worker] = {}
-"""The worker of the last sweep of a process."""
+_workers: dict[bytes, Worker] = {}
+"""The worker of the last sweep of a process, by the bytes of its task."""
 _one = threading.Lock()
 
 
-def on_cluster(task: Task, parts: Sequence[Index], client: Any) -> Iterator[Chunk]:
+def on_cluster(worker: Worker, task: Task, variants: Index, client: Any) -> Iterator[Chunk]:
     """Chunks as they are done.
 
     Each call brings all that it needs, so that nothing is lost with a worker. Only so many wait on the cluster that
     each of its threads has its next one.
 
     Raises:
-        ParameterError: it is no client.
-        SimulationError: workers are lost again and again with the same chunk.
+        ParameterError: it is no client, or a measure cannot be sent.
+        SimulationError: the scheduler is gone, workers have other libraries, or are lost again and again with the same
+            variant.
     """
     distributed = imported("distributed", "cluster", "sweep(on=...)")
     if not isinstance(client, distributed.Client):
         raise ParameterError(f"on = {client!r} must be a client of Dask: distributed.Client(...).")
-    calls = _Calls(task, parts, client, distributed.as_completed(loop=client.loop))
-    lost = distributed.KilledWorker, distributed.client.FutureCancelledError
+    if client.asynchronous or client.status == "closed":
+        raise ParameterError(f"on = {client!r} is asynchronous or closed. Give one that is open and can be waited for.")
+    calls = _Calls(worker, task, variants, client, distributed)
     try:
-        calls.submit()
-        for future in calls.completed:
-            variants = calls.waiting.pop(future)
-            try:
-                chunk = future.result()
-            except lost as error:
-                calls.again(variants, error)
-            else:
-                yield chunk
-            calls.submit()
+        while calls.submit():
+            yield from calls.next()
+    except (OSError, distributed.client.ClosedClientError) as error:
+        raise SimulationError(
+            f"The scheduler of the cluster does not answer any more: {error}. What a store has is kept: start another "
+            "one, and the same call with a new client goes on from there."
+        ) from None
     finally:
-        client.cancel(list(calls.waiting))
+        if client.status == "running":
+            client.cancel(list(calls.waiting))
 
 
 class _Calls:
     """What waits on a cluster, and what is to follow.
 
     Args:
+        worker: of this process.
         task: the sweep.
-        parts: variants of each call.
+        variants: (k,) what is to be done.
         client: of Dask.
-        completed: its futures, as they are done.
+        distributed: the library.
     """
 
-    def __init__(self, task: Task, parts: Sequence[Index], client: Any, completed: Any) -> None:
-        self._task, self._client, self.completed = task, client, completed
-        self._key, self._head = uuid4().hex, replace(task, columns=task.rows(slice(0, SIDE_BY_SIDE)))
-        self._rest = [*parts][::-1]
-        self._losses: dict[int, int] = {}
+    def __init__(self, worker: Worker, task: Task, variants: Index, client: Any, distributed: Any) -> None:
+        self._task, self._client, self._distributed = task, client, distributed
+        try:  # as bytes, which only workers unpack
+            head = imported("cloudpickle", "cluster", "sweep(on=...)").dumps(
+                replace(task, columns=task.rows(slice(0, SIDE_BY_SIDE)))
+            )
+        except (pickle.PicklingError, TypeError, AttributeError) as error:
+            raise ParameterError(
+                f"A measure cannot be sent to a cluster: {error}. Give a function of a file."
+            ) from None
+        self._head = head, libraries(), worker.why
+        self._rest = parted(variants, 8 * worker.chunk)[::-1]
+        self._done: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._each, self._room, self._looked, self._busy, self._told = 2, 0, -np.inf, time.monotonic(), False
         self.waiting: dict[Any, Index] = {}
         """Variants by future."""
 
-    def submit(self) -> None:
-        """Send as much as keeps the cluster busy, which may grow meanwhile."""
-        while self._rest and len(self.waiting) < 2 * max(1, sum(self._client.nthreads().values())):
+    def submit(self) -> bool:
+        """Send as much as keeps the cluster busy, which may grow meanwhile; whether anything waits."""
+        if (now := time.monotonic()) > self._looked + 1.0:
+            threads = sum(self._client.nthreads().values())
+            self._room, self._looked = self._each * max(1, threads), now
+            self._busy = now if threads else self._busy
+            self._say_idle(now - self._busy)
+        while self._rest and len(self.waiting) < self._room:
             variants = self._rest.pop()
-            rows = self._task.rows(variants)
-            future = self._client.submit(_measured, self._key, self._head, variants, rows, pure=False)
+            future = self._client.submit(measured, *self._head, variants, self._task.rows(variants), pure=False)
             self.waiting[future] = variants
-            self.completed.add(future)
+            future.add_done_callback(self._done.put)
+        return bool(self.waiting)
 
-    def again(self, variants: Index, error: Exception) -> None:
-        """Send what was lost with a worker once more."""
-        first = int(variants[0])
-        self._losses[first] = count = self._losses.get(first, 0) + 1
-        if count > 20:  # workers that are lost for other reasons are not lost so often with one call
+    def _say_idle(self, idle: float) -> None:
+        """What is said where there have been no workers for a time in s.
+
+        Raises:
+            SimulationError: there will be none.
+        """
+        text = "The cluster has had no workers for {} minutes. Their logs tell why."
+        local = self._client.cluster is None or isinstance(self._client.cluster, self._distributed.LocalCluster)
+        if idle > 600.0 and local:  # others may be waiting in a queue
+            raise SimulationError(f"{text.format(10)} What a store has is kept, and the same call goes on from there.")
+        if idle > 60.0 and not self._told:
+            self._told = True
+            warn(f"{text.format('some')} The sweep waits for them.", UserWarning)
+
+    def next(self) -> list[Chunk]:
+        """Chunks of a call that is done; none where none is within a second."""
+        try:
+            future = self._done.get(timeout=1.0)
+        except queue.Empty:
+            return []
+        variants = self.waiting.pop(future)
+        try:
+            done: list[Chunk] = future.result()
+        except self._distributed.KilledWorker as error:
+            if variants.size == 1:
+                raise SimulationError(
+                    f"Workers of the cluster were lost again and again with variant {variants[0]}: {error}. Their logs "
+                    "tell why; memory is the most common reason."
+                ) from None
+            self._each = 1  # Dask blames all that waits at a worker; parts take less time and memory
+            self._rest += [part for part in np.array_split(variants, 8) if part.size]
+            return []
+        except self._distributed.client.FutureCancelledError:  # with a scheduler that may come again
+            self._rest.append(variants)
+            return []
+        except ShaftworkError:
+            raise
+        except Exception as error:
             raise SimulationError(
-                f"Workers of the cluster were lost {count} times with variants {first} to {variants[-1]}: {error}. "
-                "Their logs tell why; memory is the most common reason."
+                f"A worker of the cluster failed: {type(error).__name__}: {error}. The scheduler and all workers need "
+                "the Shaftwork of this process, and the files of functions that measure."
             ) from error
-        self._rest.append(variants)
+        if (count := sum(chunk.variants.size for chunk in done)) < variants.size:
+            self._rest.append(variants[count:])
+        return done
 
 
-def _measured(key: str, head: Task, part: Index, rows: Mapping[str, Array]) -> Chunk:
-    """A chunk, in a process of the cluster, which compiles a sweep once."""
+def measured(
+    head: bytes, expected: Mapping[str, str], why: str, variants: Index, rows: Mapping[str, Array]
+) -> list[Chunk]:
+    """The first chunks of some variants, for about a second, in a process of the cluster, which compiles a sweep once.
+
+    Args:
+        head: a task of the first variants.
+        expected: versions of libraries.
+        why: variants run one by one, where the sweep was begun.
+        variants: (k,) their numbers.
+        rows: their columns.
+    """
     with _one:
-        if key not in _workers:
+        if head not in _workers:
             _workers.clear()
-            _workers[key] = Worker(head)
-        return _workers[key].run(part, rows)
+            _workers[head] = _begun(head, expected, why)
+        worker, done, end = _workers[head], [], time.monotonic() + 1.0
+        for part in parted(np.arange(variants.size), worker.chunk):
+            done.append(worker.run(variants[part], {name: column[part] for name, column in rows.items()}))
+            if time.monotonic() > end:
+                break
+        return done
+
+
+def _begun(head: bytes, expected: Mapping[str, str], why: str) -> Worker:
+    """What computes a sweep in this process.
+
+    Raises:
+        SimulationError: it would come to other digits than where the sweep was begun.
+    """
+    there = libraries()
+    if differing := [
+        f"{name} {there[name]} for {version}" for name, version in expected.items() if there[name] != version
+    ]:
+        raise SimulationError(
+            f"A worker of the cluster has {', '.join(differing)}, and may come to other digits. Install the same there."
+        )
+    _leave_memory()
+    worker = Worker(pickle.loads(head))  # noqa: S301 (what a cluster runs is trusted)
+    if worker.why != why:
+        raise SimulationError(f"A worker of the cluster runs variants in another way: '{worker.why}' for '{why}'.")
+    return worker
+
+
+def libraries() -> dict[str, str]:
+    """Versions of what the digits of a result depend on."""
+    versions = {"shaftwork": str(sys.modules[__name__.partition(".")[0]].__version__)}
+    for name in ("numpy", "scipy", "sympy", "heyoka", "numba", "scikit-sundae"):
+        try:
+            versions[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            versions[name] = "none"
+    return versions
+
+
+def _leave_memory() -> None:
+    """Let what is freed stay with this process, as elsewhere.
+
+    Dask has glibc give it back at once (MALLOC_TRIM_THRESHOLD_). Each step of a chunk would then fetch it anew, which
+    takes a fifth of all time.
+    """
+    if mallopt := getattr(ctypes.CDLL(None), "mallopt", None) if sys.platform == "linux" else None:
+        for option in (-3, -1):  # M_MMAP_THRESHOLD, M_TRIM_THRESHOLD
+            mallopt(option, 32 << 20)  # the most that glibc comes to by itself

@@ -33,7 +33,7 @@ from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
 from shaftwork.sweep.sweep_result import VERDICTS, Limits, Sweep
 from shaftwork.sweep.sweep_store import Store
-from shaftwork.sweep.sweep_task import Chunk, Index, Reader, Task, Worker, chunks, parted
+from shaftwork.sweep.sweep_task import Chunk, Index, Reader, Task, Worker, chunks
 
 LEFT = "a zero, an impact, a stiff motion or a change of mode that is not beyond doubt is left to `simulate`"
 """Why variants have left those beside them."""
@@ -165,8 +165,7 @@ def _chunks(worker: Worker, task: Task, variants: Index, processes: int | None, 
         return chunks(worker, task, variants, processes)
     from shaftwork.sweep.cluster import on_cluster
 
-    # a call over a network costs some milliseconds: eight chunks of one process are worth that
-    return on_cluster(task, parted(variants, 8 * worker.chunk), on)
+    return on_cluster(worker, task, variants, on)
 
 
 def _columns(netlist: Netlist, parameters: Any, samples: Any) -> dict[str, Array]:

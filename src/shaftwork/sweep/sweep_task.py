@@ -14,6 +14,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -311,10 +312,12 @@ def _in_processes(task: Task, parts: Sequence[Index], count: int) -> Iterator[Ch
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(min(count, len(parts)) or 1, context, _begin, (task,))
     try:
+        rest, pending = iter(parts), set[Future[Chunk]]()
         with _uninterrupted():
-            pending: set[Future[Chunk]] = {pool.submit(_run, part) for part in parts}
+            pending |= {pool.submit(_run, part) for part in islice(rest, 2 * count)}
         while pending:
             done, pending = wait(pending, return_when=FIRST_COMPLETED)
+            pending |= {pool.submit(_run, part) for part in islice(rest, len(done))}
             for future in done:
                 yield future.result()
     except BrokenProcessPool as error:
