@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import pickle
 import queue
 import sys
@@ -181,7 +180,6 @@ def _begun(head: bytes, expected: Mapping[str, str], why: str) -> Worker:
         raise SimulationError(
             f"A worker of the cluster has {', '.join(differing)}, and may come to other digits. Install the same there."
         )
-    _leave_memory()
     worker = Worker(pickle.loads(head))  # noqa: S301 (what a cluster runs is trusted)
     if worker.why != why:
         raise SimulationError(f"A worker of the cluster runs variants in another way: '{worker.why}' for '{why}'.")
@@ -197,14 +195,3 @@ def libraries() -> dict[str, str]:
         except metadata.PackageNotFoundError:
             versions[name] = "none"
     return versions
-
-
-def _leave_memory() -> None:
-    """Let what is freed stay with this process, as elsewhere.
-
-    Dask has glibc give it back at once (MALLOC_TRIM_THRESHOLD_). Each step of a chunk would then fetch it anew, which
-    takes a fifth of all time.
-    """
-    if mallopt := getattr(ctypes.CDLL(None), "mallopt", None) if sys.platform == "linux" else None:
-        for option in (-3, -1):  # M_MMAP_THRESHOLD, M_TRIM_THRESHOLD
-            mallopt(option, 32 << 20)  # the most that glibc comes to by itself
