@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from copy import copy
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.codegen.array_form.elements import Array
+from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import CompileError, ShaftworkError, SimulationError
 from shaftwork.numerics.differences import differences
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.network import Network
 from shaftwork.sensitivities.legs import DifferentiatedMotion
 from shaftwork.sensitivities.parametric_motion import ParametricMotion
 
@@ -30,7 +31,9 @@ class Source(Protocol):
 
 
 class Scaling:
-    """Parameters as numbers near one: logarithms of those that stay above zero, others by their size.
+    """Parameters by their change since the start: logarithms of those that stay above zero, others by their size.
+
+    At the start all are 0.3. As scipy's first step is as long as its start, it changes what counts most by no more.
 
     Args:
         start: values in SI by name.
@@ -39,18 +42,21 @@ class Scaling:
 
     def __init__(self, start: Mapping[str, float], positive: NDArray[np.bool_]) -> None:
         self.start, self.names, self.positive = start, tuple(start), positive
-        values = np.array(list(start.values()))
-        self._sizes = np.where(values == 0.0, 1.0, np.abs(values))
+        self._first, self._offset = np.array(list(start.values())), 0.3
+        self._sizes = np.where(self._first == 0.0, 1.0, np.abs(self._first))
 
     def unknowns(self, values: Array) -> Array:
         """(m,) from values in SI."""
         with np.errstate(divide="ignore"):  # a bound of zero is minus infinity
-            return np.where(self.positive, np.log(np.where(self.positive, values, 1.0)), values / self._sizes)
+            grown = np.log(np.where(self.positive, values / self._sizes, 1.0))
+        return self._offset + np.where(self.positive, grown, (values - self._first) / self._sizes)
 
     def values(self, unknowns: Array) -> Array:
         """(m,) in SI."""
-        grown = np.exp(np.where(self.positive, unknowns, 0.0))
-        return np.where(self.positive, grown, unknowns * self._sizes)
+        change = unknowns - self._offset
+        # Beyond these the range of floating-point numbers ends, and what is above zero would be zero.
+        grown = self._first * np.exp(np.clip(np.where(self.positive, change, 0.0), -600.0, 600.0))
+        return np.where(self.positive, grown, self._first + change * self._sizes)
 
     def slopes(self, unknowns: Array) -> Array:
         """(m,) derivatives of the values by the unknowns."""
@@ -67,7 +73,8 @@ class ScaledCurves:
 
     def __init__(self, source: Source, scale: Scaling) -> None:
         self._source, self._scale = source, scale
-        self._last: tuple[bytes, Array] = b"", np.empty(0)
+        self._count: int | None = None
+        self._values, self._slopes = BoundedCache[bytes, Array](), BoundedCache[bytes, Array](1)
         self.by_differences = False
         """Whether derivatives had to be had by differences at some values."""
 
@@ -76,20 +83,23 @@ class ScaledCurves:
 
     def values(self, unknowns: Array) -> Array:
         """(N,) computed; NaN where there is no motion, so that a shorter step is tried."""
-        if self._last[0] != (key := unknowns.tobytes()):
-            self._last = key, self._computed(unknowns)
-        return self._last[1]
+        return self._values(unknowns.tobytes(), lambda: self._computed(unknowns))
 
     def _computed(self, unknowns: Array) -> Array:
         try:
-            return self._source.values(self._parameters(unknowns))
+            values = self._source.values(self._parameters(unknowns))
         except ShaftworkError:
-            if not self._last[1].size:
+            if self._count is None:
                 raise
-            return np.full_like(self._last[1], np.nan)
+            return np.full(self._count, np.nan)
+        self._count = values.size
+        return values
 
     def slopes(self, unknowns: Array) -> Array:
         """(N, m) derivatives by the unknowns."""
+        return self._slopes(unknowns.tobytes(), lambda: self._differentiated(unknowns))
+
+    def _differentiated(self, unknowns: Array) -> Array:
         try:
             exact = self._source.slopes(self._parameters(unknowns))
         except SimulationError:  # something is touched only just, or two changes come together
@@ -105,31 +115,44 @@ class RecordedMotion:
     """Quantities of a motion at the times of a record.
 
     Args:
-        net: the network.
+        model: the compiled network.
         samples: by quantity, the times (k,) in s at which it was measured.
-        parameters: names of parameters and of states whose start values are unknown.
-        initial: start values of states.
+        start: of parameters, and of states whose start values are unknown, in SI.
+        initial: start values of the other states.
         rtol: relative tolerance of the derivatives.
     """
 
     def __init__(
         self,
-        net: Network,
+        model: Model,
         samples: Mapping[str, Array],
-        parameters: Sequence[str],
-        initial: Mapping[str, float] | None,
+        start: Mapping[str, float],
+        initial: Mapping[str, float],
         rtol: float,
     ) -> None:
         self._samples, span = samples, (0.0, last_of(samples))
-        starts = tuple(name for name in parameters if name not in net.compile().parameters)
-        names = tuple(name for name in parameters if name not in starts)
-        self._motion = ParametricMotion(net, tuple(samples), (), names, span, initial, rtol, starts)
-        self._order = [list(self._motion.parameters).index(name) for name in parameters]
-        self._last: tuple[Mapping[str, float], DifferentiatedMotion] = {}, self._motion.nominal
+        starts = {name: value for name, value in start.items() if name not in model.parameters}
+        values = {name: value for name, value in start.items() if name not in starts}
+        initial, names = {**initial, **starts}, tuple(values)
+        self._motion = ParametricMotion(model, tuple(samples), (), names, span, initial, rtol, tuple(starts), values)
+        self._order = [list(self._motion.parameters).index(name) for name in start]
+        self._last: tuple[Mapping[str, float], DifferentiatedMotion] = start, self._motion.nominal
+        self._share = 1.0
+
+    def beginning(self) -> tuple[RecordedMotion, NDArray[np.bool_]]:
+        """The first sixteenth of the record alone, and (N,) which values it holds: in so few periods an oscillation
+        keeps in step with the record from a start that is far off, and a short motion costs little.
+        """
+        share = 1 / 16
+        there = {name: times <= share * last_of(self._samples) for name, times in self._samples.items()}
+        part = copy(self)
+        part._share = share
+        part._samples = {name: times[there[name]] for name, times in self._samples.items() if there[name].any()}
+        return part, np.concatenate(list(there.values()))
 
     def _followed(self, parameters: Mapping[str, float]) -> DifferentiatedMotion:
         if self._last[0] != parameters:
-            self._last = parameters, self._motion.motion(parameters)
+            self._last = parameters, self._motion.motion(parameters, self._share)
         return self._last[1]
 
     def values(self, parameters: Mapping[str, float]) -> Array:
@@ -153,10 +176,8 @@ class SimulatedMotion:
         rtol: relative tolerance.
     """
 
-    def __init__(
-        self, model: Model, samples: Mapping[str, Array], initial: Mapping[str, float] | None, rtol: float
-    ) -> None:
-        self._model, self._samples, self._initial, self._rtol = model, samples, initial or {}, rtol
+    def __init__(self, model: Model, samples: Mapping[str, Array], initial: Mapping[str, float], rtol: float) -> None:
+        self._model, self._samples, self._initial, self._rtol = model, samples, initial, rtol
         self._end = last_of(samples)
 
     def values(self, parameters: Mapping[str, float]) -> Array:
@@ -205,14 +226,14 @@ def last_of(samples: Mapping[str, Array]) -> float:
 
 
 def recorded_motion(
-    net: Network,
+    model: Model,
     samples: Mapping[str, Array],
-    parameters: Sequence[str],
-    initial: Mapping[str, float] | None,
+    start: Mapping[str, float],
+    initial: Mapping[str, float],
     rtol: float,
 ) -> Source:
     """The motion with exact derivatives, or without where there are none."""
     try:
-        return RecordedMotion(net, samples, parameters, initial, rtol)
+        return RecordedMotion(model, samples, start, initial, rtol)
     except (CompileError, SimulationError):  # too large for symbols, or sampled
-        return SimulatedMotion(net.compile(), samples, initial, 1e-2 * rtol)
+        return SimulatedMotion(model, samples, initial, 1e-2 * rtol)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import reprlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,14 +12,14 @@ import numpy as np
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import Parameter, in_si, is_quantity
-from shaftwork.fitting.curves import RecordedResponse, ScaledCurves, Scaling, Source, recorded_motion
+from shaftwork.fitting.curves import RecordedMotion, RecordedResponse, ScaledCurves, Scaling, Source, recorded_motion
 from shaftwork.fitting.estimation import LOSSES, Data, estimate
 from shaftwork.fitting.fit_result import AT_START, Fit
 from shaftwork.network.netlist import Netlist
-from shaftwork.pipeline.arguments import checked_parameter, relative_tolerance, repeated
+from shaftwork.pipeline.arguments import checked_parameter, checked_parameters, relative_tolerance, repeated
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import refuse_motion
-from shaftwork.pipeline.network import Network, network_of, with_values
+from shaftwork.pipeline.network import Network, network_of
 from shaftwork.results.observer import array_in_si
 
 Range = tuple[float | None, float | None]
@@ -82,16 +82,23 @@ def fit(
         SimulationError: the motion at the start cannot be computed.
     """
     refuse_motion(initial, "fit")
-    ranges = _ranges(network_of(net).netlist(), net.compile(), unknowns)
-    net, initial = _begun(net, tuple(ranges), start or {}, initial or {})
-    fitted = _unknowns(net, ranges, initial)
+    model = network_of(net).compile()
+    ranges = _ranges(model, unknowns)
+    model, first = _begun(model, ranges, start or {}, initial or {})
+    fitted = _unknowns(model, ranges, first)
     domain, series = _series(record)
     samples = {name: one.at for name, one in series.items()}
-    source = _source(net, domain, samples, fitted.scaling.names, relative_tolerance(rtol), initial, at)
+    source = _source(model, domain, samples, first, relative_tolerance(rtol), initial or {}, at)
     curves = ScaledCurves(source, fitted.scaling)
     data = _data(series, sigma, *_priors(priors, fitted.scaling), loss)
-    estimated = estimate(curves, data, fitted.start, (fitted.low, fitted.high))
-    return Fit(net, fitted.units, fitted.scaling, samples, data, estimated, domain, initial, curves.by_differences)
+    beginning = None
+    if isinstance(source, RecordedMotion):
+        part, rows = source.beginning()
+        beginning = ScaledCurves(part, fitted.scaling), rows
+    estimated = estimate(curves, data, fitted.start, (fitted.low, fitted.high), beginning)
+    return Fit(
+        net, fitted.units, fitted.scaling, samples, data, estimated, domain, initial or {}, curves.by_differences
+    )
 
 
 class _Unknowns(NamedTuple):
@@ -113,10 +120,10 @@ class _Unknowns(NamedTuple):
 
 
 def _source(
-    net: Network,
+    model: Model,
     domain: str,
     samples: Mapping[str, Array],
-    names: Sequence[str],
+    start: Mapping[str, float],
     rtol: float,
     initial: Mapping[str, float],
     at: Mapping[str, float] | None,
@@ -124,32 +131,31 @@ def _source(
     if domain == "t":
         if at is not None:
             raise ParameterError("at = ... is the point of a frequency response. Of a motion give initial = {...}.")
-        return recorded_motion(net, samples, names, initial, rtol)
+        return recorded_motion(model, samples, start, initial, rtol)
     if initial:
         raise ParameterError(f"'{next(iter(initial))}' is a start value, which a frequency response has not. Give at.")
-    return RecordedResponse(net.compile(), {_pair(name): f for name, f in samples.items()}, at)
+    return RecordedResponse(model, {_pair(name): f for name, f in samples.items()}, at)
 
 
 def _begun(
-    net: Network, names: Sequence[str], start: Mapping[str, float], initial: Mapping[str, float]
-) -> tuple[Network, dict[str, float]]:
-    """The network and the start values of its states from which the fit starts."""
+    model: Model, names: Iterable[str], start: Mapping[str, float], initial: Mapping[str, float]
+) -> tuple[Model, dict[str, float]]:
+    """The model whose structure is that of the values from which the fit starts, and these by name."""
     if others := [name for name in start if name not in names]:
         raise ParameterError(f"'{others[0]}' has a start and is not unknown. Unknown are: {', '.join(names)}.")
-    states = {name: float(value) for name, value in start.items() if name not in net.compile().parameters}
-    values = {name: value for name, value in start.items() if name not in states}
-    return (with_values(net, values) if values else net), {**initial, **states}
+    values = checked_parameters(model.netlist, {name: start[name] for name in start if name in model.parameters})
+    first = {name: values.get(name, model.parameters.get(name, initial.get(name, 0.0))) for name in names}
+    first |= {name: float(value) for name, value in start.items() if name not in values}
+    return (model.with_values(values) if model.changes_structure(values) else model), first
 
 
-def _unknowns(net: Network, ranges: Mapping[str, Range], initial: Mapping[str, float]) -> _Unknowns:
+def _unknowns(model: Model, ranges: Mapping[str, Range], start: Mapping[str, float]) -> _Unknowns:
     """What is fitted, within its bounds.
 
     Raises:
         ParameterError: the start is not between them.
     """
-    model, netlist = net.compile(), net.netlist()
-    start = {name: model.parameters.get(name, initial.get(name, 0.0)) for name in ranges}
-    declared = {name: _declared(netlist, name) if name in model.parameters else None for name in ranges}
+    declared = {name: _declared(model.netlist, name) if name in model.parameters else None for name in ranges}
     ends = {name: _ends(declared[name], span) for name, span in ranges.items()}
     for name, (low, high) in ends.items():
         if not low < start[name] < high:
@@ -163,7 +169,7 @@ def _unknowns(net: Network, ranges: Mapping[str, Range], initial: Mapping[str, f
     return _Unknowns(scaling, units, *map(scaling.unknowns, sides))
 
 
-def _ranges(netlist: Netlist, model: Model, unknowns: Any) -> dict[str, Range]:
+def _ranges(model: Model, unknowns: Any) -> dict[str, Range]:
     """Low and high by name, in SI.
 
     Raises:
@@ -174,22 +180,20 @@ def _ranges(netlist: Netlist, model: Model, unknowns: Any) -> dict[str, Range]:
         raise ParameterError("Nothing is unknown. Name what to fit, such as ['shaft.c', 'shaft.d'].")
     if twice := repeated(map(str, listed)):
         raise ParameterError(f"'{twice}' is named twice. Name each unknown once.")
-    return {
-        name: _range(netlist, model, name, unknowns[name] if isinstance(unknowns, Mapping) else None) for name in listed
-    }
+    return {name: _range(model, name, unknowns[name] if isinstance(unknowns, Mapping) else None) for name in listed}
 
 
-def _range(netlist: Netlist, model: Model, name: str, span: Any) -> Range:
+def _range(model: Model, name: str, span: Any) -> Range:
     """Low and high of one, in SI."""
     is_start = name in {state.name for state in model.form.states}
     if not is_start:
-        checked_parameter(netlist, name, model.parameters.get(name))  # says which there are
+        checked_parameter(model.netlist, name, model.parameters.get(name))  # says which there are
     if span is None:
         return None, None
     if not (isinstance(span, Sequence) and not isinstance(span, str) and len(span) == 2):
         raise ParameterError(f"'{name}': {span!r} is no range. Give (low, high); None leaves a side open.")
     low, high = (
-        end if end is None else in_si(name, end, "1") if is_start else checked_parameter(netlist, name, end)
+        end if end is None else in_si(name, end, "1") if is_start else checked_parameter(model.netlist, name, end)
         for end in span
     )
     if low is not None and high is not None and low >= high:

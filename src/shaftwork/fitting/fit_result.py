@@ -30,7 +30,7 @@ class Fit:
     """Parameters of a network that fit a record.
 
     Args:
-        network: with the values that the fit began with.
+        network: that was fitted.
         units: of the unknowns by name; `AT_START` of start values.
         scaling: of the unknowns, with the values that the fit began with.
         samples: by quantity, times (k,) in s or frequencies in Hz.

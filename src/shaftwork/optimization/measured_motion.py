@@ -43,7 +43,7 @@ class MeasuredMotion:
         self._read = {name: Measure.read(goal) for name, goal in goals.items() if isinstance(goal, str)}
         self._integrands = [item for one in self._read.values() if (item := integrand(one)) is not None]
         quantities = tuple(dict.fromkeys(one.quantity for one in self._read.values()))
-        self._motion = ParametricMotion(net, quantities, self._integrands, names, (0.0, t_end), initial, rtol)
+        self._motion = ParametricMotion(net.compile(), quantities, self._integrands, names, (0.0, t_end), initial, rtol)
         self._fixed = self._motion.model.parameters
         self._last: tuple[bytes, dict[str, tuple[float, Array]]] = b"", {}
         self.motions = 0
