@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from copy import copy
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,6 +111,10 @@ class ScaledCurves:
         return differences(lambda at: self._source.values(self._parameters(at)), unknowns, steps)
 
 
+_MOTIONS = BoundedCache[tuple[Any, ...], tuple[Mapping[str, float], ParametricMotion]](1)
+"""Of the last fit, with the values for which it was made: the next one like it compiles nothing."""
+
+
 class RecordedMotion:
     """Quantities of a motion at the times of a record.
 
@@ -133,10 +137,15 @@ class RecordedMotion:
         self._samples, span = samples, (0.0, last_of(samples))
         starts = {name: value for name, value in start.items() if name not in model.parameters}
         values = {name: value for name, value in start.items() if name not in starts}
-        initial, names = {**initial, **starts}, tuple(values)
-        self._motion = ParametricMotion(model, tuple(samples), (), names, span, initial, rtol, tuple(starts), values)
+        initial = {**initial, **starts}
+        names = tuple(samples), (), tuple(values)
+        rest = span, tuple(sorted(initial.items())), rtol, tuple(starts)
+        at, self._motion = _MOTIONS(
+            (model, *names, *rest),
+            lambda: (start, ParametricMotion(model, *names, span, initial, rtol, tuple(starts), values)),
+        )
         self._order = [list(self._motion.parameters).index(name) for name in start]
-        self._last: tuple[Mapping[str, float], DifferentiatedMotion] = start, self._motion.nominal
+        self._last: tuple[Mapping[str, float], DifferentiatedMotion] = at, self._motion.nominal
         self._share = 1.0
 
     def beginning(self) -> tuple[RecordedMotion, NDArray[np.bool_]]:

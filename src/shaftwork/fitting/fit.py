@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array
+from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import Parameter, in_si, is_quantity
 from shaftwork.fitting.curves import RecordedMotion, RecordedResponse, ScaledCurves, Scaling, Source, recorded_motion
@@ -23,6 +24,8 @@ from shaftwork.pipeline.network import Network, network_of
 from shaftwork.results.observer import array_in_si
 
 Range = tuple[float | None, float | None]
+_MODELS = BoundedCache[Netlist, Model](1)
+"""Of the network that was fitted last."""
 
 
 class _Series(NamedTuple):
@@ -82,7 +85,7 @@ def fit(
         SimulationError: the motion at the start cannot be computed.
     """
     refuse_motion(initial, "fit")
-    model = network_of(net).compile()
+    model = _MODELS(network_of(net).netlist(), net.compile)
     ranges = _ranges(model, unknowns)
     model, first = _begun(model, ranges, start or {}, initial or {})
     fitted = _unknowns(model, ranges, first)
@@ -146,7 +149,7 @@ def _begun(
     values = checked_parameters(model.netlist, {name: start[name] for name in start if name in model.parameters})
     first = {name: values.get(name, model.parameters.get(name, initial.get(name, 0.0))) for name in names}
     first |= {name: float(value) for name, value in start.items() if name not in values}
-    return (model.with_values(values) if model.changes_structure(values) else model), first
+    return (model.variant(values) if model.changes_structure(values) else model), first
 
 
 def _unknowns(model: Model, ranges: Mapping[str, Range], start: Mapping[str, float]) -> _Unknowns:

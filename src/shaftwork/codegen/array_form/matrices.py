@@ -177,10 +177,10 @@ class MatrixAssembly:
         """The inverse, block by block of connected unknowns; diagonal where nothing is coupled."""
         if blocks.rational:
             return inverse_of_fractions(matrix)
-        matrix = sparse.csr_array(matrix)
-        size = matrix.shape[0]
-        count, label = connected_components(matrix, directed=False)
-        diagonal = matrix.diagonal()
+        size, diagonal = matrix.shape[0], matrix.diagonal()
+        is_diagonal = isinstance(matrix, np.ndarray) and np.count_nonzero(matrix) == np.count_nonzero(diagonal)
+        matrix = matrix if is_diagonal else sparse.csr_array(matrix)
+        count, label = (size, None) if is_diagonal else connected_components(matrix, directed=False)
         if count == size:
             if (bad := np.flatnonzero(diagonal == 0)).size:
                 raise self._singular(branches[bad[:1]], what)
