@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from copy import copy
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -111,42 +110,26 @@ class ScaledCurves:
         return differences(lambda at: self._source.values(self._parameters(at)), unknowns, steps)
 
 
-_MOTIONS = BoundedCache[tuple[Any, ...], tuple[Mapping[str, float], ParametricMotion]](1)
-"""Of the last fit, with the values for which it was made: the next one like it compiles nothing."""
-
-
 class RecordedMotion:
     """Quantities of a motion at the times of a record.
 
     Args:
-        model: the compiled network.
+        motion: of the network.
         samples: by quantity, the times (k,) in s at which it was measured.
-        start: of parameters, and of states whose start values are unknown, in SI.
-        initial: start values of the other states.
-        rtol: relative tolerance of the derivatives.
+        order: (m,) places of the unknowns among the parameters of the motion.
+        last: values of the unknowns, and their motion.
+        share: of the motion, from its start on, that is computed.
     """
 
     def __init__(
         self,
-        model: Model,
+        motion: ParametricMotion,
         samples: Mapping[str, Array],
-        start: Mapping[str, float],
-        initial: Mapping[str, float],
-        rtol: float,
+        order: Sequence[int],
+        last: tuple[Mapping[str, float], DifferentiatedMotion],
+        share: float = 1.0,
     ) -> None:
-        self._samples, span = samples, (0.0, last_of(samples))
-        starts = {name: value for name, value in start.items() if name not in model.parameters}
-        values = {name: value for name, value in start.items() if name not in starts}
-        initial = {**initial, **starts}
-        names = tuple(samples), (), tuple(values)
-        rest = span, tuple(sorted(initial.items())), rtol, tuple(starts)
-        at, self._motion = _MOTIONS(
-            (model, *names, *rest),
-            lambda: (start, ParametricMotion(model, *names, span, initial, rtol, tuple(starts), values)),
-        )
-        self._order = [list(self._motion.parameters).index(name) for name in start]
-        self._last: tuple[Mapping[str, float], DifferentiatedMotion] = at, self._motion.nominal
-        self._share = 1.0
+        self._motion, self._samples, self._order, self._last, self._share = motion, samples, order, last, share
 
     def beginning(self) -> tuple[RecordedMotion, NDArray[np.bool_]]:
         """The first sixteenth of the record alone, and (N,) which values it holds: in so few periods an oscillation
@@ -154,9 +137,8 @@ class RecordedMotion:
         """
         share = 1 / 16
         there = {name: times <= share * last_of(self._samples) for name, times in self._samples.items()}
-        part = copy(self)
-        part._share = share
-        part._samples = {name: times[there[name]] for name, times in self._samples.items() if there[name].any()}
+        samples = {name: times[there[name]] for name, times in self._samples.items() if there[name].any()}
+        part = RecordedMotion(self._motion, samples, self._order, self._last, share)
         return part, np.concatenate(list(there.values()))
 
     def _followed(self, parameters: Mapping[str, float]) -> DifferentiatedMotion:
@@ -234,6 +216,10 @@ def last_of(samples: Mapping[str, Array]) -> float:
     return max(float(times[-1]) for times in samples.values())
 
 
+_MOTIONS = BoundedCache[tuple[Any, ...], tuple[Mapping[str, float], ParametricMotion]](1)
+"""Of the last fit, with the values for which it was made: the next one like it compiles nothing."""
+
+
 def recorded_motion(
     model: Model,
     samples: Mapping[str, Array],
@@ -241,8 +227,23 @@ def recorded_motion(
     initial: Mapping[str, float],
     rtol: float,
 ) -> Source:
-    """The motion with exact derivatives, or without where there are none."""
+    """The motion with exact derivatives, or without where there are none.
+
+    Args:
+        model: the compiled network.
+        samples: by quantity, the times (k,) in s at which it was measured.
+        start: of parameters, and of states whose start values are unknown, in SI.
+        initial: start values of the other states.
+        rtol: relative tolerance of the derivatives.
+    """
+    values = {name: value for name, value in start.items() if name in model.parameters}
+    starts = tuple(name for name in start if name not in values)
+    states = {**initial, **{name: start[name] for name in starts}}
+    names, span = (tuple(samples), (), tuple(values)), (0.0, last_of(samples))
+    key = (model, *names, span, tuple(sorted(states.items())), rtol, starts)
     try:
-        return RecordedMotion(model, samples, start, initial, rtol)
+        at, motion = _MOTIONS(key, lambda: (start, ParametricMotion(model, *names, span, states, rtol, starts, values)))
     except (CompileError, SimulationError):  # too large for symbols, or sampled
         return SimulatedMotion(model, samples, initial, 1e-2 * rtol)
+    order = [list(motion.parameters).index(name) for name in start]
+    return RecordedMotion(motion, samples, order, (at, motion.nominal))
