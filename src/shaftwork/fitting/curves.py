@@ -63,15 +63,15 @@ class Scaling:
 
 
 class ScaledCurves:
-    """A source as a function of scaled unknowns.
+    """Sources as a function of scaled unknowns.
 
     Args:
-        source: what is computed.
+        sources: what is computed, one after the other.
         scale: of the unknowns.
     """
 
-    def __init__(self, source: Source, scale: Scaling) -> None:
-        self._source, self._scale = source, scale
+    def __init__(self, sources: Sequence[Source], scale: Scaling) -> None:
+        self._sources, self._scale = tuple(sources), scale
         self._count: int | None = None
         self._values, self._slopes = BoundedCache[bytes, Array](), BoundedCache[bytes, Array](1)
         self.by_differences = False
@@ -86,7 +86,7 @@ class ScaledCurves:
 
     def _computed(self, unknowns: Array) -> Array:
         try:
-            values = self._source.values(self._parameters(unknowns))
+            values = self._read(unknowns)
         except ShaftworkError:
             if self._count is None:
                 raise
@@ -94,20 +94,25 @@ class ScaledCurves:
         self._count = values.size
         return values
 
+    def _read(self, unknowns: Array) -> Array:
+        parameters = self._parameters(unknowns)
+        return np.concatenate([source.values(parameters) for source in self._sources])
+
     def slopes(self, unknowns: Array) -> Array:
         """(N, m) derivatives by the unknowns."""
         return self._slopes(unknowns.tobytes(), lambda: self._differentiated(unknowns))
 
     def _differentiated(self, unknowns: Array) -> Array:
+        parameters, exact = self._parameters(unknowns), list[Array]()
         try:
-            exact = self._source.slopes(self._parameters(unknowns))
+            exact += [by for source in self._sources if (by := source.slopes(parameters)) is not None]
         except SimulationError:  # something is touched only just, or two changes come together
-            exact = None
-        if exact is not None:
-            return exact * self._scale.slopes(unknowns)
+            exact.clear()
+        if len(exact) == len(self._sources):
+            return np.vstack(exact) * self._scale.slopes(unknowns)
         self.by_differences = True
         steps = np.full(unknowns.size, 1e-4)  # a motion is known to 1e-9 and more: so its differences are to some 1e-5
-        return differences(lambda at: self._source.values(self._parameters(at)), unknowns, steps)
+        return differences(self._read, unknowns, steps)
 
 
 class RecordedMotion:

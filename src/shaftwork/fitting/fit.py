@@ -3,54 +3,46 @@
 from __future__ import annotations
 
 import math
-import reprlib
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.parameters import Parameter, in_si, is_quantity
+from shaftwork.core.parameters import Parameter, in_si
 from shaftwork.fitting.curves import RecordedMotion, RecordedResponse, ScaledCurves, Scaling, Source, recorded_motion
 from shaftwork.fitting.estimation import LOSSES, Data, estimate
 from shaftwork.fitting.fit_result import AT_START, Fit
+from shaftwork.fitting.records import Series, read_records
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import checked_parameter, checked_parameters, relative_tolerance, repeated
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import refuse_motion
 from shaftwork.pipeline.network import Network, network_of
-from shaftwork.results.observer import array_in_si
+from shaftwork.results.solution import Solution
 
 Range = tuple[float | None, float | None]
+OfEach = Mapping[str, float] | Sequence[Mapping[str, float]] | None
+"""Values by name, for all records or one mapping for each."""
 _MODELS = BoundedCache[Netlist, Model](1)
 """Of the network that was fitted last."""
 
 
-class _Series(NamedTuple):
-    """One recorded quantity.
-
-    Args:
-        at: (k,) times in s, or frequencies in Hz.
-        measured: (k,) values, or (2 k,) real parts before imaginary ones.
-    """
-
-    at: Array
-    measured: Array
-
-
 def fit(
     net: Network,
-    record: Mapping[str, Any],
+    record: Mapping[str, Any] | Sequence[Mapping[str, Any]],
     unknowns: Sequence[str] | Mapping[str, Range | None],
     *,
     start: Mapping[str, float] | None = None,
     sigma: float | Mapping[str, float] | None = None,
     priors: Mapping[str, tuple[float, float]] | None = None,
     loss: str = "linear",
-    initial: Mapping[str, float] | None = None,
-    at: Mapping[str, float] | None = None,
+    initial: OfEach = None,
+    parameters: OfEach = None,
+    at: OfEach = None,
     rtol: float = 1e-6,
 ) -> Fit:
     """Find parameters of a network from a record of its motion, or of its frequency response.
@@ -68,15 +60,16 @@ def fit(
         net: the network.
         record: {"t": times in s, "shaft.tau": values, ...}, also a pandas data frame; NaN is no value. Times count from
             the start of the motion. Or {"f": frequencies in Hz, "shaft.tau / motor.tau": complex values}, output over
-            input. Values in SI.
+            input. Values in SI. Or a list of such records, which are fitted together.
         unknowns: names, ["shaft.c", "shaft.d"], also of states whose start values are unknown, "J1.omega"; or by name
             (low, high), None leaves a side open.
         start: values of unknowns to start from; by default those of the network, and of `initial`.
         sigma: standard deviation of the noise in SI, one or by quantity; by default it is estimated from the record.
         priors: by name (value, standard deviation), what is known of an unknown without the record.
         loss: "linear", or for records with outliers "soft_l1", "huber" or "cauchy", see scipy's `least_squares`.
-        initial: start values of states.
-        at: for a frequency response, the point, as for `Model.linearize`.
+        initial: start values of states; of several records a list, one mapping for each, where they differ.
+        parameters: values of other parameters where they differ from the network's, likewise one or a list.
+        at: for a frequency response, the point, as for `Model.linearize`, likewise.
         rtol: relative tolerance of the derivatives; motions are computed a hundred times closer.
 
     Raises:
@@ -84,23 +77,28 @@ def fit(
         SignalError: there is no such quantity.
         SimulationError: the motion at the start cannot be computed.
     """
-    refuse_motion(initial, "fit")
+    domain, records = read_records(record)
+    initials, others, points = (
+        _of_each(name, given, len(records))
+        for name, given in (("initial", initial), ("parameters", parameters), ("at", at))
+    )
+    for states in initials:
+        refuse_motion(states, "fit")
     model = _MODELS(network_of(net).netlist(), net.compile)
     ranges = _ranges(model, unknowns)
-    model, first = _begun(model, ranges, start or {}, initial or {})
-    fitted = _unknowns(model, ranges, first)
-    domain, series = _series(record)
+    model, first = _begun(model, ranges, start or {}, initials[0] or {})
+    fitted, series = _unknowns(model, ranges, first), {name: one for each in records for name, one in each.items()}
+    sources = [
+        _source(_with(model, values, first), domain, each, first, relative_tolerance(rtol), states, point)
+        for each, states, values, point in zip(records, initials, others, points, strict=True)
+    ]
+    curves = ScaledCurves(sources, fitted.scaling)
+    data = _data(tuple(series.values()), sigma, *_priors(priors, fitted.scaling), loss)
+    bounds, beginning = (fitted.low, fitted.high), _beginning(sources, fitted.scaling)
+    estimated = estimate(curves, data, fitted.start, bounds, beginning)
     samples = {name: one.at for name, one in series.items()}
-    source = _source(model, domain, samples, first, relative_tolerance(rtol), initial or {}, at)
-    curves = ScaledCurves(source, fitted.scaling)
-    data = _data(series, sigma, *_priors(priors, fitted.scaling), loss)
-    beginning = None
-    if isinstance(source, RecordedMotion):
-        part, rows = source.beginning()
-        beginning = ScaledCurves(part, fitted.scaling), rows
-    estimated = estimate(curves, data, fitted.start, (fitted.low, fitted.high), beginning)
     return Fit(
-        net, fitted.units, fitted.scaling, samples, data, estimated, domain, initial or {}, curves.by_differences
+        net, fitted.units, fitted.scaling, samples, data, estimated, domain, initials[0] or {}, curves.by_differences
     )
 
 
@@ -122,19 +120,51 @@ class _Unknowns(NamedTuple):
     high: Array
 
 
+def _of_each(name: str, given: Any, count: int) -> Sequence[Any]:
+    """What is given for each record, where it may be given once for all.
+
+    Raises:
+        ParameterError: there are more or fewer, or one is something else than values by name.
+    """
+    each = given if isinstance(given, list | tuple) else [given] * count
+    if len(each) != count:
+        raise ParameterError(f"{name} has {len(each)} entries for {count} records. Give one for each, or one for all.")
+    if others := [one for one in each if not isinstance(one, Mapping | Solution | None)]:
+        raise ParameterError(f"{name} must be values by name, such as {{'J1.omega': 8.0}}, not {others[0]!r}.")
+    return each
+
+
+def _with(model: Model, values: Mapping[str, float] | None, unknowns: Mapping[str, float]) -> Model:
+    """The model with other values of parameters that are not fitted."""
+    if both := [name for name in values or {} if name in unknowns]:
+        raise ParameterError(f"'{both[0]}' is unknown and has a value in parameters. Leave it out of one of them.")
+    return model.variant(checked_parameters(model.netlist, values)) if values else model
+
+
+def _beginning(sources: Sequence[Source], scale: Scaling) -> tuple[ScaledCurves, NDArray[np.bool_]] | None:
+    """The first part of all records, and which values it holds; None where one has none of its own."""
+    motions = [source for source in sources if isinstance(source, RecordedMotion)]
+    if len(motions) < len(sources):
+        return None
+    parts = [motion.beginning() for motion in motions]
+    curves = ScaledCurves([part for part, rows in parts if rows.any()], scale)
+    return curves, np.concatenate([rows for _, rows in parts])
+
+
 def _source(
     model: Model,
     domain: str,
-    samples: Mapping[str, Array],
+    series: Mapping[str, Series],
     start: Mapping[str, float],
     rtol: float,
-    initial: Mapping[str, float],
+    initial: Mapping[str, float] | None,
     at: Mapping[str, float] | None,
 ) -> Source:
+    samples = {one.quantity: one.at for one in series.values()}
     if domain == "t":
         if at is not None:
             raise ParameterError("at = ... is the point of a frequency response. Of a motion give initial = {...}.")
-        return recorded_motion(model, samples, start, initial, rtol)
+        return recorded_motion(model, samples, start, initial or {}, rtol)
     if initial:
         raise ParameterError(f"'{next(iter(initial))}' is a start value, which a frequency response has not. Give at.")
     return RecordedResponse(model, {_pair(name): f for name, f in samples.items()}, at)
@@ -217,54 +247,6 @@ def _ends(parameter: Parameter | None, span: Range) -> tuple[float, float]:
     return max(lows, default=-np.inf), min(highs, default=np.inf)
 
 
-def _series(record: Any) -> tuple[str, dict[str, _Series]]:
-    """Whether over times "t" or frequencies "f", and what is recorded there, in ascending order.
-
-    Raises:
-        ParameterError: there is neither or both, a column has another length, or no value.
-    """
-    if not hasattr(record, "items"):
-        raise ParameterError(f"{reprlib.repr(record)} is no record. Give {{'t': times, 'shaft.tau': values}}.")
-    columns = {str(name): values for name, values in record.items()}
-    domains = [name for name in ("t", "f") if name in columns]
-    if len(domains) != 1 or len(columns) < 2:
-        raise ParameterError(
-            "A record has a column 't' of times in s or 'f' of frequencies in Hz, and beside it what was measured. "
-            f"There are: {', '.join(columns) or 'none'}."
-        )
-    domain = domains[0]
-    at = array_in_si(domain, _plain(columns.pop(domain)), {"t": "s", "f": "Hz"}[domain])
-    if not (at.size and np.isfinite(at).all() and at.min() >= 0.0):
-        raise ParameterError(f"'{domain}' must be numbers from zero on. A motion starts at t = 0 s.")
-    return domain, {name: _one_series(name, column, at, domain) for name, column in columns.items()}
-
-
-def _one_series(name: str, column: Any, at: Array, domain: str) -> _Series:
-    """A column in ascending order, without what is missing."""
-    if is_quantity(column):
-        raise ParameterError(f"'{name}' has a unit. Give plain numbers in SI.")
-    values = np.asarray(_plain(column))
-    if domain == "t" and np.iscomplexobj(values):
-        raise ParameterError(f"'{name}' is complex: a frequency response has a column 'f' in place of 't'.")
-    if values.shape != at.shape:
-        raise ParameterError(f"'{name}' has {values.shape} values, and '{domain}' {at.shape}. They must be as many.")
-    order = np.argsort(at, kind="stable")
-    try:
-        ordered = values[order].astype(float if domain == "t" else complex)
-    except (TypeError, ValueError):
-        raise ParameterError(f"'{name}' holds something else than numbers: {reprlib.repr(column)}.") from None
-    there = np.isfinite(ordered)
-    if not there.any():
-        raise ParameterError(f"'{name}' has no finite value.")
-    parts = [ordered] if domain == "t" else [ordered.real, ordered.imag]
-    return _Series(at[order][there], np.concatenate([part[there] for part in parts]))
-
-
-def _plain(values: Any) -> Any:
-    """A column of a data frame as an array."""
-    return values.to_numpy() if hasattr(values, "to_numpy") else values
-
-
 def _pair(name: str) -> tuple[str, str]:
     """Output and input of a frequency response."""
     output, slash, source = name.partition("/")
@@ -305,9 +287,10 @@ def _priors(priors: Mapping[str, tuple[float, float]] | None, scale: Scaling) ->
     return np.where(there, scaled, np.nan), deviations / scale.slopes(scaled)
 
 
-def _data(series: Mapping[str, _Series], sigma: Any, priors: Array, prior_deviations: Array, loss: str) -> Data:
+def _data(series: Sequence[Series], sigma: Any, priors: Array, prior_deviations: Array, loss: str) -> Data:
     if loss not in LOSSES:
         raise ParameterError(f"There is no loss {loss!r}. Take one of: {', '.join(LOSSES)}.")
-    measured = [one.measured for one in series.values()]
+    measured = [one.measured for one in series]
     numbers = np.repeat(np.arange(len(series)), [values.size for values in measured])
-    return Data(np.concatenate(measured), numbers, _deviations(sigma, tuple(series)), priors, prior_deviations, loss)
+    deviations = _deviations(sigma, [one.quantity for one in series])
+    return Data(np.concatenate(measured), numbers, deviations, priors, prior_deviations, loss)

@@ -37,7 +37,7 @@ class Fit:
         data: what was measured.
         estimate: what was found, in scaled unknowns.
         domain: "t" or "f".
-        initial: start values of states.
+        initial: start values of states; of several records those of the first.
         by_differences: whether some derivatives had to be had by differences.
     """
 
