@@ -37,12 +37,12 @@ class Scaling:
     Args:
         start: values in SI by name.
         positive: (m,) which are taken by their logarithms.
+        sizes: (m,) of the values.
     """
 
-    def __init__(self, start: Mapping[str, float], positive: NDArray[np.bool_]) -> None:
-        self.start, self.names, self.positive = start, tuple(start), positive
+    def __init__(self, start: Mapping[str, float], positive: NDArray[np.bool_], sizes: Array) -> None:
+        self.start, self.names, self.positive, self._sizes = start, tuple(start), positive, sizes
         self._first, self._offset = np.array(list(start.values())), 0.3
-        self._sizes = np.where(self._first == 0.0, 1.0, np.abs(self._first))
 
     def unknowns(self, values: Array) -> Array:
         """(m,) from values in SI."""
@@ -53,8 +53,8 @@ class Scaling:
     def values(self, unknowns: Array) -> Array:
         """(m,) in SI."""
         change = unknowns - self._offset
-        # Beyond these the range of floating-point numbers ends, and what is above zero would be zero.
-        grown = self._first * np.exp(np.clip(np.where(self.positive, change, 0.0), -600.0, 600.0))
+        with np.errstate(over="ignore"):  # of what is not known at all
+            grown = self._first * np.exp(np.where(self.positive, change, 0.0))
         return np.where(self.positive, grown, self._first + change * self._sizes)
 
     def slopes(self, unknowns: Array) -> Array:
@@ -78,7 +78,10 @@ class ScaledCurves:
         """Whether derivatives had to be had by differences at some values."""
 
     def _parameters(self, unknowns: Array) -> dict[str, float]:
-        return dict(zip(self._scale.names, self._scale.values(unknowns).tolist(), strict=True))
+        values, limits = self._scale.values(unknowns), np.finfo(float)
+        # What must stay above zero may have become too small for any number, and a step too long.
+        values = np.where(self._scale.positive, np.clip(values, limits.tiny, limits.max), values)
+        return dict(zip(self._scale.names, values.tolist(), strict=True))
 
     def values(self, unknowns: Array) -> Array:
         """(N,) computed; NaN where there is no motion, so that a shorter step is tried."""
@@ -160,6 +163,19 @@ class RecordedMotion:
         """(N, m) derivatives by the parameters."""
         slopes = self._motion.slopes(self._followed(parameters), parameters)
         return np.vstack([slopes.along(name, times) for name, times in self._samples.items()])[:, self._order]
+
+
+def sizes_of(start: Mapping[str, float], sources: Sequence[Source], measured: Array) -> Array:
+    """(m,) sizes of unknowns: those at the start; of one that is zero, what moves the computed values by the size of
+    the record.
+    """
+    sizes, ones = np.abs(list(start.values())), np.ones(len(start))
+    if sizes.all():
+        return sizes
+    scale = Scaling(start, ones < 0, ones)
+    moved = np.linalg.norm(ScaledCurves(sources, scale).slopes(scale.unknowns(np.array(list(start.values())))), axis=0)
+    size = float(np.linalg.norm(measured))
+    return np.where(sizes > 0.0, sizes, np.divide(size, moved, out=ones, where=(moved > 0.0) & (size > 0.0)))
 
 
 class SimulatedMotion:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,12 +14,20 @@ from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import Parameter, in_si
-from shaftwork.fitting.curves import RecordedMotion, RecordedResponse, ScaledCurves, Scaling, Source, recorded_motion
+from shaftwork.fitting.curves import (
+    RecordedMotion,
+    RecordedResponse,
+    ScaledCurves,
+    Scaling,
+    Source,
+    recorded_motion,
+    sizes_of,
+)
 from shaftwork.fitting.estimation import LOSSES, Data, estimate
 from shaftwork.fitting.fit_result import AT_START, Fit
 from shaftwork.fitting.records import Series, read_records
 from shaftwork.network.netlist import Netlist
-from shaftwork.pipeline.arguments import checked_parameter, checked_parameters, relative_tolerance, repeated
+from shaftwork.pipeline.arguments import checked_parameter, checked_parameters, range_of, relative_tolerance, repeated
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import refuse_motion
 from shaftwork.pipeline.network import Network, network_of
@@ -85,21 +94,24 @@ def fit(
     for states in initials:
         refuse_motion(states, "fit")
     model = _MODELS(network_of(net).netlist(), net.compile)
-    ranges = _ranges(model, unknowns)
-    model, first = _begun(model, ranges, start or {}, initials[0] or {})
-    fitted, series = _unknowns(model, ranges, first), {name: one for each in records for name, one in each.items()}
+    names, usual = _names(unknowns), initials[0] or {}
+    model, begun = _begun(model, names, start or {})
+    spans = unknowns if isinstance(unknowns, Mapping) else dict.fromkeys(names)
+    ranges = {name: _range(model, name, spans[name]) for name in names}
+    first = {name: begun.get(name, model.parameters.get(name, usual.get(name, 0.0))) for name in names}
+    series = {name: one for each in records for name, one in each.items()}
     sources = [
         _source(_with(model, values, first), domain, each, first, relative_tolerance(rtol), states, point)
         for each, states, values, point in zip(records, initials, others, points, strict=True)
     ]
+    measured = np.concatenate([one.measured for one in series.values()])
+    fitted = _unknowns(model, ranges, first, sizes_of(first, sources, measured))
     curves = ScaledCurves(sources, fitted.scaling)
     data = _data(tuple(series.values()), sigma, *_priors(priors, fitted.scaling), loss)
     bounds, beginning = (fitted.low, fitted.high), _beginning(sources, fitted.scaling)
     estimated = estimate(curves, data, fitted.start, bounds, beginning)
     samples = {name: one.at for name, one in series.items()}
-    return Fit(
-        net, fitted.units, fitted.scaling, samples, data, estimated, domain, initials[0] or {}, curves.by_differences
-    )
+    return Fit(net, fitted.units, fitted.scaling, samples, data, estimated, domain, usual, curves.by_differences)
 
 
 class _Unknowns(NamedTuple):
@@ -170,19 +182,20 @@ def _source(
     return RecordedResponse(model, {_pair(name): f for name, f in samples.items()}, at)
 
 
-def _begun(
-    model: Model, names: Iterable[str], start: Mapping[str, float], initial: Mapping[str, float]
-) -> tuple[Model, dict[str, float]]:
-    """The model whose structure is that of the values from which the fit starts, and these by name."""
+def _begun(model: Model, names: Iterable[str], start: Mapping[str, float]) -> tuple[Model, dict[str, float]]:
+    """The model whose structure is that of the values from which the fit starts, and these values, in SI."""
     if others := [name for name in start if name not in names]:
         raise ParameterError(f"'{others[0]}' has a start and is not unknown. Unknown are: {', '.join(names)}.")
-    values = checked_parameters(model.netlist, {name: start[name] for name in start if name in model.parameters})
-    first = {name: values.get(name, model.parameters.get(name, initial.get(name, 0.0))) for name in names}
-    first |= {name: float(value) for name, value in start.items() if name not in values}
-    return (model.variant(values) if model.changes_structure(values) else model), first
+    states = {name: in_si(f"start of '{name}'", start[name], "1") for name in _states(model) if name in start}
+    values = checked_parameters(model.netlist, {name: start[name] for name in start if name not in states})
+    return (model.variant(values) if model.changes_structure(values) else model), {**values, **states}
 
 
-def _unknowns(model: Model, ranges: Mapping[str, Range], start: Mapping[str, float]) -> _Unknowns:
+def _states(model: Model) -> list[str]:
+    return [state.name for state in model.form.states]
+
+
+def _unknowns(model: Model, ranges: Mapping[str, Range], start: Mapping[str, float], sizes: Array) -> _Unknowns:
     """What is fitted, within its bounds.
 
     Raises:
@@ -196,42 +209,45 @@ def _unknowns(model: Model, ranges: Mapping[str, Range], start: Mapping[str, flo
                 f"'{name}' = {start[name]:g} is where the fit starts, and must lie between {low:g} and {high:g}. Give "
                 "another one, start={...}, or another range."
             )
-    scaling = Scaling(start, np.array([start[name] > 0 <= low for name, (low, _) in ends.items()]))
+    scaling = Scaling(start, np.array([start[name] > 0 <= low for name, (low, _) in ends.items()]), sizes)
     units = {name: AT_START if parameter is None else parameter.unit for name, parameter in declared.items()}
     sides = (np.array(values) for values in (list(start.values()), *zip(*ends.values(), strict=True)))
     return _Unknowns(scaling, units, *map(scaling.unknowns, sides))
 
 
-def _ranges(model: Model, unknowns: Any) -> dict[str, Range]:
-    """Low and high by name, in SI.
+def _names(unknowns: Any) -> list[str]:
+    """Those of the unknowns.
 
     Raises:
-        ParameterError: there is no such parameter, it is named twice, or a range is none.
+        ParameterError: there is none, or one is named twice.
     """
-    listed = [unknowns] if isinstance(unknowns, str) else list(unknowns)
+    listed = [unknowns] if isinstance(unknowns, str) else [str(name) for name in unknowns]
     if not listed:
         raise ParameterError("Nothing is unknown. Name what to fit, such as ['shaft.c', 'shaft.d'].")
-    if twice := repeated(map(str, listed)):
+    if twice := repeated(listed):
         raise ParameterError(f"'{twice}' is named twice. Name each unknown once.")
-    return {name: _range(model, name, unknowns[name] if isinstance(unknowns, Mapping) else None) for name in listed}
+    return listed
 
 
 def _range(model: Model, name: str, span: Any) -> Range:
-    """Low and high of one, in SI."""
-    is_start = name in {state.name for state in model.form.states}
-    if not is_start:
-        checked_parameter(model.netlist, name, model.parameters.get(name))  # says which there are
+    """Low and high of one, in SI.
+
+    Raises:
+        ParameterError: there is no such parameter, or a range is none.
+    """
+    states = _states(model)
+    if name in model.form.graph.zeros:
+        raise ParameterError(f"'{name}' is zero, so it is in no equation. Give the value to start from, start={{...}}.")
+    if name not in states and name not in model.parameters:
+        raise ParameterError(
+            f"There is no parameter '{name}' with a number. There are: {', '.join(model.parameters)}. States, whose "
+            f"start values may be unknown, are: {', '.join(states)}."
+        )
     if span is None:
         return None, None
-    if not (isinstance(span, Sequence) and not isinstance(span, str) and len(span) == 2):
-        raise ParameterError(f"'{name}': {span!r} is no range. Give (low, high); None leaves a side open.")
-    low, high = (
-        end if end is None else in_si(name, end, "1") if is_start else checked_parameter(model.netlist, name, end)
-        for end in span
+    return range_of(
+        name, span, partial(in_si, name) if name in states else partial(checked_parameter, model.netlist, name)
     )
-    if low is not None and high is not None and low >= high:
-        raise ParameterError(f"'{name}': ({low:g}, {high:g}) is no range. The first must be less than the second.")
-    return low, high
 
 
 def _declared(netlist: Netlist, name: str) -> Parameter:
@@ -290,7 +306,7 @@ def _priors(priors: Mapping[str, tuple[float, float]] | None, scale: Scaling) ->
 def _data(series: Sequence[Series], sigma: Any, priors: Array, prior_deviations: Array, loss: str) -> Data:
     if loss not in LOSSES:
         raise ParameterError(f"There is no loss {loss!r}. Take one of: {', '.join(LOSSES)}.")
-    measured = [one.measured for one in series]
-    numbers = np.repeat(np.arange(len(series)), [values.size for values in measured])
+    measured = np.concatenate([one.measured for one in series])
+    numbers = np.repeat(np.arange(len(series)), [one.measured.size for one in series])
     deviations = _deviations(sigma, [one.quantity for one in series])
-    return Data(np.concatenate(measured), numbers, deviations, priors, prior_deviations, loss)
+    return Data(measured, numbers, deviations, priors, prior_deviations, loss)

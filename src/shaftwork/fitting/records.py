@@ -62,7 +62,7 @@ def _read(record: Any) -> tuple[str, dict[str, Series]]:
             f"There are: {', '.join(columns) or 'none'}."
         )
     domain = domains[0]
-    at = array_in_si(domain, _plain(columns.pop(domain)), {"t": "s", "f": "Hz"}[domain])
+    at = array_in_si(domain, columns.pop(domain), {"t": "s", "f": "Hz"}[domain])
     if not (at.size and np.isfinite(at).all() and at.min() >= 0.0):
         raise ParameterError(f"'{domain}' must be numbers from zero on. A motion starts at t = 0 s.")
     return domain, {name: _one_series(name, column, at, domain) for name, column in columns.items()}
@@ -72,7 +72,7 @@ def _one_series(name: str, column: Any, at: Array, domain: str) -> Series:
     """A column in ascending order, without what is missing."""
     if is_quantity(column):
         raise ParameterError(f"'{name}' has a unit. Give plain numbers in SI.")
-    values = np.asarray(_plain(column))
+    values = np.asarray(column)
     if domain == "t" and np.iscomplexobj(values):
         raise ParameterError(f"'{name}' is complex: a frequency response has a column 'f' in place of 't'.")
     if values.shape != at.shape:
@@ -87,8 +87,3 @@ def _one_series(name: str, column: Any, at: Array, domain: str) -> Series:
         raise ParameterError(f"'{name}' has no finite value.")
     parts = [ordered] if domain == "t" else [ordered.real, ordered.imag]
     return Series(name, at[order][there], np.concatenate([part[there] for part in parts]))
-
-
-def _plain(values: Any) -> Any:
-    """A column of a data frame as an array."""
-    return values.to_numpy() if hasattr(values, "to_numpy") else values

@@ -60,17 +60,17 @@ class MeasuredMotion:
         return self._last[1]
 
     def _computed(self, variables: Array) -> dict[str, tuple[float, Array]]:
-        values, found = self.values(variables), dict[str, tuple[float, Array]]()
+        values, results = self.values(variables), dict[str, tuple[float, Array]]()
         if self._read:
             self.motions += 1
             try:
-                found = self._measures(values)
+                results = self._measures(values)
             except (SimulationError, NetworkError):
-                found = {name: (np.nan, np.zeros(variables.size)) for name in self._read}
+                results = {name: (np.nan, np.zeros(variables.size)) for name in self._read}
         for name, goal in self._goals.items():
             if not isinstance(goal, str):
-                found[name] = self._of_parameters(goal, variables)
-        return found
+                results[name] = self._of_parameters(goal, variables)
+        return results
 
     def _measures(self, values: Mapping[str, float]) -> dict[str, tuple[float, Array]]:
         motion = self._motion.motion(values)
