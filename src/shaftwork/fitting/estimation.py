@@ -118,38 +118,70 @@ def estimate(
         ParameterError: there are fewer values than unknowns.
         SimulationError: the motion at the start cannot be computed.
     """
+    unknowns, weights = _begun(curves, data, start, bounds, beginning)
+    result, weights, evaluations, message = _settled(curves, data, unknowns, weights, bounds)
+    unknowns, residuals = result.x, curves.values(result.x) - data.measured
+    at_bounds, slopes = result.active_mask != 0, curves.slopes(unknowns)
+    covariance, directions, spreads = _spread(slopes, residuals, data, weights, at_bounds)
+    if data.loss == "linear" and np.isfinite(covariance).all():
+        step = _last_step(slopes, residuals, data, weights, covariance, unknowns)
+        unknowns, residuals = np.clip(unknowns + step, *bounds), residuals + slopes @ step
+    return Estimate(unknowns, covariance, weights, residuals, directions, spreads, at_bounds, evaluations, message)
+
+
+def _begun(
+    curves: Curves,
+    data: Data,
+    start: Array,
+    bounds: tuple[Array, Array],
+    beginning: tuple[Curves, NDArray[np.bool_]] | None,
+) -> tuple[Array, Array]:
+    """The unknowns (m,) with which the whole is fitted first, and deviations (series,) of the noise there."""
     if data.measured.size < start.size:
         raise ParameterError(
             f"The record has {data.measured.size} values for {start.size} unknowns. Give more, or fewer unknowns."
         )
-    unknowns, evaluations, message = start, 0, ""
-    deviations = data.deviations
     residuals = curves.values(start) - data.measured
     if not np.isfinite(residuals).all():
         raise SimulationError("At the start values the motion has no finite values. Start from other values.")
-    weights = _noise(residuals, data, 0) if deviations is None else deviations
-    if beginning is not None and beginning[1].any():
-        unknowns = _led(curves, data, weights, start, bounds, *beginning)
-        weights = _noise(curves.values(unknowns) - data.measured, data, 0) if deviations is None else deviations
+    weights = _noise(residuals, data, 0) if data.deviations is None else data.deviations
+    if beginning is None or not beginning[1].any():
+        return start, weights
+    unknowns = _led(curves, data, weights, start, bounds, *beginning)
+    return unknowns, _noise(curves.values(unknowns) - data.measured, data, 0) if data.deviations is None else weights
+
+
+def _settled(
+    curves: Curves, data: Data, unknowns: Array, weights: Array, bounds: tuple[Array, Array]
+) -> tuple[Any, Array, int, str]:
+    """Scipy's last result, deviations (series,), motions computed, and why it is no minimum, if it is none."""
     alone = weights.size == 1 and data.loss == "linear" and np.isnan(data.priors).all()
-    settled = deviations is not None or alone
+    settled, evaluations, message = data.deviations is not None or alone, 0, ""
+    # A ten-thousandth of its deviation is the last step, which derivatives tell to more than that.
+    last_gain = 1e-8 / data.measured.size
     rounds = 30  # deviations and unknowns settle in some five
     for _ in range(rounds):
         # While the deviations change, the minimum moves with them.
-        last, result = settled, _fitted(curves, data, weights, unknowns, bounds, TYPED if settled else 1e-3)
+        last, result = settled, _fitted(curves, data, weights, unknowns, bounds, last_gain if settled else 1e-5)
         evaluations += int(result.nfev)
         message = "" if result.status > 0 else str(result.message).rstrip(".")
-        unknowns, residuals = result.x, result.fun[: data.measured.size] * weights[data.series]
-        if deviations is None:
+        unknowns = result.x
+        if data.deviations is None:
+            residuals = result.fun[: data.measured.size] * weights[data.series]
             before, weights = weights, _noise(residuals, data, unknowns.size)
-            settled = alone or bool((np.abs(weights - before) <= 1e-3 * weights).all())
+            settled = alone or bool((np.abs(weights - before) <= 1e-4 * weights).all())
         if settled and last:
-            break
-    else:
-        message = message or f"the noise has not settled in {rounds} rounds"
-    at_bounds = result.active_mask != 0
-    covariance, directions, spreads = _spread(curves.slopes(unknowns), residuals, data, weights, at_bounds)
-    return Estimate(unknowns, covariance, weights, residuals, directions, spreads, at_bounds, evaluations, message)
+            return result, weights, evaluations, message
+    return result, weights, evaluations, message or f"the noise has not settled in {rounds} rounds"
+
+
+def _last_step(
+    slopes: Array, residuals: Array, data: Data, deviations: Array, covariance: Array, unknowns: Array
+) -> Array:
+    """(m,) to the minimum, as far as derivatives that are there already tell; zero where it is no small step."""
+    pull = np.where(np.isnan(data.priors), 0.0, (unknowns - data.priors) / data.prior_deviations**2)
+    step = -covariance @ (slopes.T @ (residuals / deviations[data.series] ** 2) + pull)
+    return step * (np.abs(step) <= 1e-4 * np.sqrt(np.diag(covariance))).all()
 
 
 def _led(
@@ -188,9 +220,12 @@ def _noise(residuals: Array, data: Data, unknowns: int) -> Array:
 
 
 def _fitted(
-    curves: Curves, data: Data, deviations: Array, start: Array, bounds: tuple[Array, Array], ftol: float
+    curves: Curves, data: Data, deviations: Array, start: Array, bounds: tuple[Array, Array], gain: float
 ) -> Any:
-    """Scipy's result; its cost counts priors without a loss."""
+    """Scipy's result; its cost counts priors without a loss.
+
+    It ends where one more step would lower the cost by less than a part `gain`.
+    """
     scale, expected = 1 / deviations[data.series], ~np.isnan(data.priors)
     apart = np.eye(start.size)[expected] / data.prior_deviations[expected, None]
 
@@ -201,12 +236,11 @@ def _fitted(
     def slopes(unknowns: Array) -> Array:
         J, r = np.vstack([curves.slopes(unknowns) * scale[:, None], apart]), away(unknowns)
         Q, R = np.linalg.qr(J)
-        gain, regular = Q.T @ r, (np.abs(R.diagonal()) > EQUAL * np.abs(R).max(initial=0.0)).all()
-        # Within a ten-thousandth of its deviation of the minimum an estimate is there.
-        if data.loss == "linear" and regular and gain @ gain * r.size <= 1e-8 * (r @ r):
-            end = unknowns - np.linalg.solve(R, gain)
+        lower = Q.T @ r
+        if data.loss == "linear" and lower @ lower <= gain * (r @ r) and np.linalg.cond(R) < 1 / EQUAL:
+            end = unknowns - np.linalg.solve(R, lower)
             if (bounds[0] < end).all() and (end < bounds[1]).all():
-                return np.zeros_like(J)  # which ends it without one more motion
+                return np.zeros_like(J)  # which tells scipy that this is the minimum
         return J
 
     def loss(z: Array) -> Array:
@@ -222,7 +256,7 @@ def _fitted(
         loss="linear" if data.loss == "linear" else loss,
         x_scale="jac",
         xtol=EQUAL,
-        ftol=ftol,
+        ftol=max(gain, TYPED),
         gtol=EPS,
         max_nfev=200,
     )
