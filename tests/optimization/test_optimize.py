@@ -108,6 +108,7 @@ def test_where_no_design_meets_the_limits_the_error_says_how_near_they_came() ->
     [
         ({"variables": {}}, "Nothing is variable"),
         ({"variables": {"gear.ratio": 3.0}}, "is no range"),
+        ({"variables": {"gear.ratio": (None, 3.0)}}, "has an open side"),
         ({"variables": {"gear.ratio": (3.0, 2.0)}}, "is no range"),
         ({"variables": {"gear.i": (3.0, 2.0)}}, "no parameter 'gear.i'"),
         ({"goal": "JL.omega"}, "is no measure"),
