@@ -25,7 +25,7 @@ from shaftwork.fitting.curves import (
 )
 from shaftwork.fitting.estimation import LOSSES, Data, estimate
 from shaftwork.fitting.fit_result import AT_START, Fit
-from shaftwork.fitting.records import Series, read_records
+from shaftwork.fitting.records import RecordedSeries, read_records
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import checked_parameter, checked_parameters, range_of, relative_tolerance, repeated
 from shaftwork.pipeline.model import Model
@@ -166,7 +166,7 @@ def _beginning(sources: Sequence[Source], scale: Scaling) -> tuple[ScaledCurves,
 def _source(
     model: Model,
     domain: str,
-    series: Mapping[str, Series],
+    series: Mapping[str, RecordedSeries],
     start: Mapping[str, float],
     rtol: float,
     initial: Mapping[str, float] | None,
@@ -303,7 +303,7 @@ def _priors(priors: Mapping[str, tuple[float, float]] | None, scale: Scaling) ->
     return np.where(there, scaled, np.nan), deviations / scale.slopes(scaled)
 
 
-def _data(series: Sequence[Series], sigma: Any, priors: Array, prior_deviations: Array, loss: str) -> Data:
+def _data(series: Sequence[RecordedSeries], sigma: Any, priors: Array, prior_deviations: Array, loss: str) -> Data:
     if loss not in LOSSES:
         raise ParameterError(f"There is no loss {loss!r}. Take one of: {', '.join(LOSSES)}.")
     measured = np.concatenate([one.measured for one in series])

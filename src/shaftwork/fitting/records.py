@@ -13,7 +13,7 @@ from shaftwork.core.parameters import is_quantity
 from shaftwork.results.observer import array_in_si
 
 
-class Series(NamedTuple):
+class RecordedSeries(NamedTuple):
     """One recorded quantity.
 
     Args:
@@ -27,7 +27,7 @@ class Series(NamedTuple):
     measured: Array
 
 
-def read_records(record: Any) -> tuple[str, list[dict[str, Series]]]:
+def read_records(record: Any) -> tuple[str, list[dict[str, RecordedSeries]]]:
     """Whether over times "t" or frequencies "f", and what each of one or several records holds, by label.
 
     Raises:
@@ -46,7 +46,7 @@ def read_records(record: Any) -> tuple[str, list[dict[str, Series]]]:
     ]
 
 
-def _read(record: Any) -> tuple[str, dict[str, Series]]:
+def _read(record: Any) -> tuple[str, dict[str, RecordedSeries]]:
     """Whether over times "t" or frequencies "f", and what is recorded there, in ascending order.
 
     Raises:
@@ -68,7 +68,7 @@ def _read(record: Any) -> tuple[str, dict[str, Series]]:
     return domain, {name: _one_series(name, column, at, domain) for name, column in columns.items()}
 
 
-def _one_series(name: str, column: Any, at: Array, domain: str) -> Series:
+def _one_series(name: str, column: Any, at: Array, domain: str) -> RecordedSeries:
     """A column in ascending order, without what is missing."""
     if is_quantity(column):
         raise ParameterError(f"'{name}' has a unit. Give plain numbers in SI.")
@@ -86,4 +86,4 @@ def _one_series(name: str, column: Any, at: Array, domain: str) -> Series:
     if not there.any():
         raise ParameterError(f"'{name}' has no finite value.")
     parts = [ordered] if domain == "t" else [ordered.real, ordered.imag]
-    return Series(name, at[order][there], np.concatenate([part[there] for part in parts]))
+    return RecordedSeries(name, at[order][there], np.concatenate([part[there] for part in parts]))
