@@ -106,3 +106,23 @@ def test_intervals_of_every_loss_are_as_wide_as_estimates_spread(loss: str) -> N
         stated.append(found.covariance[1, 1] ** 0.5)
     # the deviation of 200 values is known to 5 percent
     assert np.mean(stated) == pytest.approx(np.std(slopes), rel=0.12)
+
+
+class Restless:
+    """A mean that scatters anew whenever it is computed."""
+
+    def __init__(self) -> None:
+        self._rng = np.random.default_rng(0)
+
+    def values(self, unknowns: Array) -> Array:
+        return unknowns[0] + self._rng.normal(0.0, 1.0, 20)
+
+    def slopes(self, _: Array) -> Array:
+        return np.ones((20, 1))
+
+
+def test_a_fit_that_does_not_settle_says_so() -> None:
+    none, series = np.full(1, np.nan), np.repeat([0, 1], 10)
+    restless = Data(np.zeros(20), series, None, none, none, "linear")
+    ended = estimate(Restless(), restless, np.zeros(1), (np.full(1, -np.inf), np.full(1, np.inf)))
+    assert "has not settled" in ended.message

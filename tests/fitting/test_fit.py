@@ -124,6 +124,78 @@ def test_a_start_value_is_found_with_the_parameters() -> None:
     assert fit.parameters == {"shaft.c": fit.values["shaft.c"]}
 
 
+def test_an_unknown_that_starts_at_zero_has_the_size_of_what_it_does() -> None:
+    net, rng = sw.Network("decay"), np.random.default_rng(2)
+    net.add(sw.Spring("shaft", c=100.0, d=0.5), "wheel", "ground")
+    net.add(sw.Inertia("J", J=2.0), "wheel")
+    t = np.linspace(0.0, 3.0, 301)
+    speed = net.simulate(3.0, initial={"shaft.tau_c": 200.0}, t_eval=t)["J.omega"] + rng.normal(0.0, 2.0, t.size)
+    fit = sw.fit(net, {"t": t, "J.omega": speed}, ["shaft.tau_c", "shaft.c"])
+    assert fit.deviations["shaft.tau_c"] > 1.0  # N m, more than one in SI, and little beside 200
+    assert fit.values["shaft.tau_c"] == pytest.approx(200.0, abs=4 * fit.deviations["shaft.tau_c"])
+    assert not fit.unseen
+
+
+def test_a_parameter_that_is_zero_in_the_network_is_fitted_from_its_start() -> None:
+    net = sw.Network("decay")
+    net.add(sw.Spring("shaft", c=100.0), "wheel", "ground")
+    net.add(sw.Inertia("J", J=2.0), "wheel")
+    t = np.linspace(0.0, 3.0, 101)
+    damped = net.compile().simulate(3.0, initial={"J.omega": 5.0}, parameters={"shaft.d": 0.7}, t_eval=t, rtol=1e-10)
+    record, initial = {"t": t, "J.omega": damped["J.omega"]}, {"J.omega": 5.0}
+    fit = sw.fit(net, record, "shaft.d", start={"shaft.d": 0.2}, initial=initial)
+    assert fit.values["shaft.d"] == pytest.approx(0.7, rel=1e-6)
+    with pytest.raises(sw.ParameterError, match=r"'shaft\.d' is zero"):
+        sw.fit(net, record, "shaft.d", initial=initial)
+
+
+def test_records_with_loads_and_start_values_of_their_own_are_fitted_together() -> None:
+    net, rng = sw.scenes.crane_start(), np.random.default_rng(6)
+    model, t = net.compile(), np.linspace(0.0, 4.0, 201)
+    loads = [{"load.tau": 15.0}, {"load.tau": 30.0}]
+    starts = [{"J1.omega": 1.0, "J2.omega": 1.0}, {"J1.omega": 6.0, "J2.omega": 6.0}]
+    motions = [
+        model.simulate(4.0, parameters=load, initial=start, t_eval=t)["shaft.tau"]
+        for load, start in zip(loads, starts, strict=True)
+    ]
+    records = [{"t": t, "shaft.tau": tau + rng.normal(0.0, 3.0, t.size)} for tau in motions]
+    unknowns, start, true = ["shaft.c", "shaft.d"], {"shaft.c": 21000.0}, model.parameters
+    both = sw.fit(net, records, unknowns, start=start, parameters=loads, initial=starts)
+    assert list(both.noise) == ["shaft.tau (1)", "shaft.tau (2)"]
+    for name, (low, high) in both.intervals(0.999).items():
+        assert low < true[name] < high
+    single = [
+        sw.fit(net, record, unknowns, start=start, parameters=load, initial=states)
+        for record, load, states in zip(records, loads, starts, strict=True)
+    ]
+    # what independent records tell adds up: 1 / s^2 = sum 1 / s_k^2 for parameters that hang together hardly
+    for name in unknowns:
+        expected = sum(fit.deviations[name] ** -2 for fit in single) ** -0.5
+        assert both.deviations[name] == pytest.approx(expected, rel=0.05)
+
+
+def test_a_network_that_is_made_again_is_fitted_alike_and_other_starts_end_there() -> None:
+    rng = np.random.default_rng(11)
+    records = record(smooth(np.random.default_rng(4)), ["shaft.tau"], rng)
+    names, true = ["shaft.c", "shaft.d"], smooth(np.random.default_rng(4)).compile().parameters
+    fits = [
+        sw.fit(smooth(np.random.default_rng(4)), records, names, start={"shaft.c": share * true["shaft.c"]})
+        for share in (0.9, 0.9, 1.15)
+    ]
+    assert fits[0].values == fits[1].values
+    for name in names:  # where a fit ends is right to a ten-thousandth of the deviation and more
+        assert fits[2].values[name] == pytest.approx(fits[0].values[name], abs=1e-3 * fits[0].deviations[name])
+
+
+def test_a_start_at_which_the_rest_of_the_record_is_out_of_step_is_led_by_its_beginning() -> None:
+    net, rng = sw.scenes.crane_start(), np.random.default_rng(12)
+    t = np.linspace(0.0, 6.5, 651)
+    measured = net.simulate(6.5, t_eval=t)["shaft.tau"] + rng.normal(0.0, 3.0, t.size)
+    fit = sw.fit(net, {"t": t, "shaft.tau": measured}, ["shaft.c", "shaft.d"], start={"shaft.c": 17000.0})
+    assert fit.noise["shaft.tau"] == pytest.approx(3.0, rel=0.1)
+    assert fit.estimate.evaluations < 8  # some thirteen over the whole record alone
+
+
 def test_a_frequency_response_tells_stiffness_and_damping() -> None:
     net, rng = sw.scenes.crane_start(), np.random.default_rng(4)
     point, f = {"J1.omega": 8.0, "J2.omega": 8.0}, np.linspace(1.0, 15.0, 60)
@@ -192,6 +264,15 @@ def test_a_controller_that_samples_is_fitted_by_differences() -> None:
         ({"record": {"t": [0.0, 1.0], "shaft.tau": ["a", "b"]}}, "something else than numbers"),
         ({"unknowns": {"J1.omega": ("x", 2.0)}}, "J1.omega"),
         ({"sigma": {}}, "no value for 'shaft.tau'"),
+        ({"record": []}, "no record"),
+        (
+            {"record": [{"t": [1.0], "shaft.tau": [1.0]}, {"f": [1.0], "shaft.tau / motor.tau": [1.0]}]},
+            "some over freq",
+        ),
+        ({"initial": [{}, {}]}, "2 entries for 1 records"),
+        ({"initial": 3.0}, "must be values by name"),
+        ({"parameters": {"shaft.c": 2e4}}, "is unknown and has a value"),
+        ({"start": {"shaft.c": "x"}}, "shaft"),
         ({"loss": "absolute"}, "no loss 'absolute'"),
         ({"record": {"f": [1.0, 2.0], "shaft.tau": [1.0, 2.0]}}, "is no response"),
         ({"record": {"t": [1.0], "shaft.tau": [1.0]}, "unknowns": ["shaft.c", "shaft.d"]}, "1 values for 2 unknowns"),

@@ -136,6 +136,11 @@ def test_bands_hold_the_courses_and_the_mean() -> None:
     assert high[-1] - low[-1] == pytest.approx(2 * 1.96 * 0.25, rel=0.15)  # a quantile of 400 samples
 
 
+def test_a_sample_that_is_not_admissible_is_named() -> None:
+    with pytest.raises(sw.ParameterError, match=r"The sample .*-1"):
+        sw.studies.bands(sw.scenes.crane_start(), "shaft.tau", [0.0, 0.1], {"J1.J": [27.0, -1.0]})
+
+
 def test_bands_over_seeds_take_each_seed_once() -> None:
     net = sw.Network("noise")
     net.add(sw.TorqueSource("motor", tau=20.0), "wheel")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import textwrap
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import islice
 from typing import Any
@@ -99,7 +99,9 @@ def _tqdm() -> Any:
     return tqdm
 
 
-def in_columns(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Rows of as many cells as lines, every column as wide as its widest cell."""
+def in_columns(rows: Sequence[Sequence[str]], numbers: Container[int] = ()) -> list[str]:
+    """Rows of as many cells as lines, every column as wide as its widest cell; columns of numbers end alike."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+    sides = [str.rjust if column in numbers else str.ljust for column in range(len(widths))]
+    cells = ([side(*cell) for side, cell in zip(sides, zip(row, widths, strict=True), strict=True)] for row in rows)
+    return ["  ".join(row).rstrip() for row in cells]

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.codegen.array_form.elements import Array
+from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import CompileError, ShaftworkError, SimulationError
 from shaftwork.numerics.differences import differences
 from shaftwork.pipeline.model import Model
-from shaftwork.pipeline.network import Network
 from shaftwork.sensitivities.legs import DifferentiatedMotion
 from shaftwork.sensitivities.parametric_motion import ParametricMotion
 
@@ -30,27 +30,32 @@ class Source(Protocol):
 
 
 class Scaling:
-    """Parameters as numbers near one: logarithms of those that stay above zero, others by their size.
+    """Parameters by their change since the start: logarithms of those that stay above zero, others by their size.
+
+    At the start all are 0.3. As scipy's first step is as long as its start, it changes what counts most by no more.
 
     Args:
         start: values in SI by name.
         positive: (m,) which are taken by their logarithms.
+        sizes: (m,) of the values.
     """
 
-    def __init__(self, start: Mapping[str, float], positive: NDArray[np.bool_]) -> None:
-        self.start, self.names, self.positive = start, tuple(start), positive
-        values = np.array(list(start.values()))
-        self._sizes = np.where(values == 0.0, 1.0, np.abs(values))
+    def __init__(self, start: Mapping[str, float], positive: NDArray[np.bool_], sizes: Array) -> None:
+        self.start, self.names, self.positive, self._sizes = start, tuple(start), positive, sizes
+        self._first, self._offset = np.array(list(start.values())), 0.3
 
     def unknowns(self, values: Array) -> Array:
         """(m,) from values in SI."""
         with np.errstate(divide="ignore"):  # a bound of zero is minus infinity
-            return np.where(self.positive, np.log(np.where(self.positive, values, 1.0)), values / self._sizes)
+            grown = np.log(np.where(self.positive, values / self._sizes, 1.0))
+        return self._offset + np.where(self.positive, grown, (values - self._first) / self._sizes)
 
     def values(self, unknowns: Array) -> Array:
         """(m,) in SI."""
-        grown = np.exp(np.where(self.positive, unknowns, 0.0))
-        return np.where(self.positive, grown, unknowns * self._sizes)
+        change = unknowns - self._offset
+        with np.errstate(over="ignore"):  # of what is not known at all
+            grown = self._first * np.exp(np.where(self.positive, change, 0.0))
+        return np.where(self.positive, grown, self._first + change * self._sizes)
 
     def slopes(self, unknowns: Array) -> Array:
         """(m,) derivatives of the values by the unknowns."""
@@ -58,78 +63,95 @@ class Scaling:
 
 
 class ScaledCurves:
-    """A source as a function of scaled unknowns.
+    """Sources as a function of scaled unknowns.
 
     Args:
-        source: what is computed.
+        sources: what is computed, one after the other.
         scale: of the unknowns.
     """
 
-    def __init__(self, source: Source, scale: Scaling) -> None:
-        self._source, self._scale = source, scale
-        self._last: tuple[bytes, Array] = b"", np.empty(0)
+    def __init__(self, sources: Sequence[Source], scale: Scaling) -> None:
+        self._sources, self._scale = tuple(sources), scale
+        self._count: int | None = None
+        self._values, self._slopes = BoundedCache[bytes, Array](), BoundedCache[bytes, Array](1)
         self.by_differences = False
         """Whether derivatives had to be had by differences at some values."""
 
     def _parameters(self, unknowns: Array) -> dict[str, float]:
-        return dict(zip(self._scale.names, self._scale.values(unknowns).tolist(), strict=True))
+        values, limits = self._scale.values(unknowns), np.finfo(float)
+        # What must stay above zero may have become too small for any number, and a step too long.
+        values = np.where(self._scale.positive, np.clip(values, limits.tiny, limits.max), values)
+        return dict(zip(self._scale.names, values.tolist(), strict=True))
 
     def values(self, unknowns: Array) -> Array:
         """(N,) computed; NaN where there is no motion, so that a shorter step is tried."""
-        if self._last[0] != (key := unknowns.tobytes()):
-            self._last = key, self._computed(unknowns)
-        return self._last[1]
+        return self._values(unknowns.tobytes(), lambda: self._computed(unknowns))
 
     def _computed(self, unknowns: Array) -> Array:
         try:
-            return self._source.values(self._parameters(unknowns))
+            values = self._read(unknowns)
         except ShaftworkError:
-            if not self._last[1].size:
+            if self._count is None:
                 raise
-            return np.full_like(self._last[1], np.nan)
+            return np.full(self._count, np.nan)
+        self._count = values.size
+        return values
+
+    def _read(self, unknowns: Array) -> Array:
+        parameters = self._parameters(unknowns)
+        return np.concatenate([source.values(parameters) for source in self._sources])
 
     def slopes(self, unknowns: Array) -> Array:
         """(N, m) derivatives by the unknowns."""
+        return self._slopes(unknowns.tobytes(), lambda: self._differentiated(unknowns))
+
+    def _differentiated(self, unknowns: Array) -> Array:
+        parameters, exact = self._parameters(unknowns), list[Array]()
         try:
-            exact = self._source.slopes(self._parameters(unknowns))
+            exact += [by for source in self._sources if (by := source.slopes(parameters)) is not None]
         except SimulationError:  # something is touched only just, or two changes come together
-            exact = None
-        if exact is not None:
-            return exact * self._scale.slopes(unknowns)
+            exact.clear()
+        if len(exact) == len(self._sources):
+            return np.vstack(exact) * self._scale.slopes(unknowns)
         self.by_differences = True
         steps = np.full(unknowns.size, 1e-4)  # a motion is known to 1e-9 and more: so its differences are to some 1e-5
-        return differences(lambda at: self._source.values(self._parameters(at)), unknowns, steps)
+        return differences(self._read, unknowns, steps)
 
 
 class RecordedMotion:
     """Quantities of a motion at the times of a record.
 
     Args:
-        net: the network.
+        motion: of the network.
         samples: by quantity, the times (k,) in s at which it was measured.
-        parameters: names of parameters and of states whose start values are unknown.
-        initial: start values of states.
-        rtol: relative tolerance of the derivatives.
+        order: (m,) places of the unknowns among the parameters of the motion.
+        last: values of the unknowns, and their motion.
+        share: of the motion, from its start on, that is computed.
     """
 
     def __init__(
         self,
-        net: Network,
+        motion: ParametricMotion,
         samples: Mapping[str, Array],
-        parameters: Sequence[str],
-        initial: Mapping[str, float] | None,
-        rtol: float,
+        order: Sequence[int],
+        last: tuple[Mapping[str, float], DifferentiatedMotion],
+        share: float = 1.0,
     ) -> None:
-        self._samples, span = samples, (0.0, last_of(samples))
-        starts = tuple(name for name in parameters if name not in net.compile().parameters)
-        names = tuple(name for name in parameters if name not in starts)
-        self._motion = ParametricMotion(net, tuple(samples), (), names, span, initial, rtol, starts)
-        self._order = [list(self._motion.parameters).index(name) for name in parameters]
-        self._last: tuple[Mapping[str, float], DifferentiatedMotion] = {}, self._motion.nominal
+        self._motion, self._samples, self._order, self._last, self._share = motion, samples, order, last, share
+
+    def beginning(self) -> tuple[RecordedMotion, NDArray[np.bool_]]:
+        """The first sixteenth of the record alone, and (N,) which values it holds: in so few periods an oscillation
+        keeps in step with the record from a start that is far off, and a short motion costs little.
+        """
+        share = 1 / 16
+        there = {name: times <= share * last_of(self._samples) for name, times in self._samples.items()}
+        samples = {name: times[there[name]] for name, times in self._samples.items() if there[name].any()}
+        part = RecordedMotion(self._motion, samples, self._order, self._last, share)
+        return part, np.concatenate(list(there.values()))
 
     def _followed(self, parameters: Mapping[str, float]) -> DifferentiatedMotion:
         if self._last[0] != parameters:
-            self._last = parameters, self._motion.motion(parameters)
+            self._last = parameters, self._motion.motion(parameters, self._share)
         return self._last[1]
 
     def values(self, parameters: Mapping[str, float]) -> Array:
@@ -143,6 +165,19 @@ class RecordedMotion:
         return np.vstack([slopes.along(name, times) for name, times in self._samples.items()])[:, self._order]
 
 
+def sizes_of(start: Mapping[str, float], sources: Sequence[Source], measured: Array) -> Array:
+    """(m,) sizes of unknowns: those at the start; of one that is zero, what moves the computed values by the size of
+    the record.
+    """
+    sizes, ones = np.abs(list(start.values())), np.ones(len(start))
+    if sizes.all():
+        return sizes
+    scale = Scaling(start, ones < 0, ones)
+    moved = np.linalg.norm(ScaledCurves(sources, scale).slopes(scale.unknowns(np.array(list(start.values())))), axis=0)
+    size = float(np.linalg.norm(measured))
+    return np.where(sizes > 0.0, sizes, np.divide(size, moved, out=ones, where=(moved > 0.0) & (size > 0.0)))
+
+
 class SimulatedMotion:
     """The same by simulation alone, where equations are not symbolic or controllers sample.
 
@@ -153,10 +188,8 @@ class SimulatedMotion:
         rtol: relative tolerance.
     """
 
-    def __init__(
-        self, model: Model, samples: Mapping[str, Array], initial: Mapping[str, float] | None, rtol: float
-    ) -> None:
-        self._model, self._samples, self._initial, self._rtol = model, samples, initial or {}, rtol
+    def __init__(self, model: Model, samples: Mapping[str, Array], initial: Mapping[str, float], rtol: float) -> None:
+        self._model, self._samples, self._initial, self._rtol = model, samples, initial, rtol
         self._end = last_of(samples)
 
     def values(self, parameters: Mapping[str, float]) -> Array:
@@ -204,15 +237,34 @@ def last_of(samples: Mapping[str, Array]) -> float:
     return max(float(times[-1]) for times in samples.values())
 
 
+_MOTIONS = BoundedCache[tuple[Any, ...], tuple[Mapping[str, float], ParametricMotion]](1)
+"""Of the last fit, with the values for which it was made: the next one like it compiles nothing."""
+
+
 def recorded_motion(
-    net: Network,
+    model: Model,
     samples: Mapping[str, Array],
-    parameters: Sequence[str],
-    initial: Mapping[str, float] | None,
+    start: Mapping[str, float],
+    initial: Mapping[str, float],
     rtol: float,
 ) -> Source:
-    """The motion with exact derivatives, or without where there are none."""
+    """The motion with exact derivatives, or without where there are none.
+
+    Args:
+        model: the compiled network.
+        samples: by quantity, the times (k,) in s at which it was measured.
+        start: of parameters, and of states whose start values are unknown, in SI.
+        initial: start values of the other states.
+        rtol: relative tolerance of the derivatives.
+    """
+    values = {name: value for name, value in start.items() if name in model.parameters}
+    starts = tuple(name for name in start if name not in values)
+    states = {**initial, **{name: start[name] for name in starts}}
+    names, span = (tuple(samples), (), tuple(values)), (0.0, last_of(samples))
+    key = (model, *names, span, tuple(sorted(states.items())), rtol, starts)
     try:
-        return RecordedMotion(net, samples, parameters, initial, rtol)
+        at, motion = _MOTIONS(key, lambda: (start, ParametricMotion(model, *names, span, states, rtol, starts, values)))
     except (CompileError, SimulationError):  # too large for symbols, or sampled
-        return SimulatedMotion(net.compile(), samples, initial, 1e-2 * rtol)
+        return SimulatedMotion(model, samples, initial, 1e-2 * rtol)
+    order = [list(motion.parameters).index(name) for name in start]
+    return RecordedMotion(motion, samples, order, (at, motion.nominal))

@@ -18,7 +18,7 @@ from scipy.optimize import least_squares
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import ParameterError, SimulationError
-from shaftwork.numerics.tolerances import EQUAL, TYPED
+from shaftwork.numerics.tolerances import EPS, EQUAL, TYPED
 
 LOSSES: dict[str, Callable[[Array], tuple[Array, Array, Array]]] = {
     "linear": lambda z: (z, np.ones_like(z), np.zeros_like(z)),
@@ -83,7 +83,7 @@ class Estimate:
         directions: (m, m) combinations of the unknowns, each a row of length one, the best known first.
         spreads: (m,) standard deviation of each combination.
         at_bounds: (m,) which unknowns ended at a bound.
-        evaluations: motions computed.
+        evaluations: motions computed over the whole record.
         message: why it is no minimum yet; empty where it is one.
     """
 
@@ -98,40 +98,112 @@ class Estimate:
     message: str
 
 
-def estimate(curves: Curves, data: Data, start: Array, bounds: tuple[Array, Array]) -> Estimate:
+def estimate(
+    curves: Curves,
+    data: Data,
+    start: Array,
+    bounds: tuple[Array, Array],
+    beginning: tuple[Curves, NDArray[np.bool_]] | None = None,
+) -> Estimate:
     """Fit the unknowns, and the deviations of the noise in turn with them where these are not given.
+
+    Args:
+        curves: what is computed.
+        data: what is measured.
+        start: (m,) unknowns to start from.
+        bounds: (m,) and (m,) of the unknowns.
+        beginning: a part of the curves that is fitted first, and (N,) which values it holds.
 
     Raises:
         ParameterError: there are fewer values than unknowns.
         SimulationError: the motion at the start cannot be computed.
     """
+    unknowns, weights = _begun(curves, data, start, bounds, beginning)
+    result, weights, evaluations, message = _settled(curves, data, unknowns, weights, bounds)
+    unknowns, residuals = result.x, curves.values(result.x) - data.measured
+    at_bounds, slopes = result.active_mask != 0, curves.slopes(unknowns)
+    covariance, directions, spreads = _spread(slopes, residuals, data, weights, at_bounds)
+    if data.loss == "linear" and np.isfinite(covariance).all():
+        step = _last_step(slopes, residuals, data, weights, covariance, unknowns)
+        unknowns, residuals = np.clip(unknowns + step, *bounds), residuals + slopes @ step
+    return Estimate(unknowns, covariance, weights, residuals, directions, spreads, at_bounds, evaluations, message)
+
+
+def _begun(
+    curves: Curves,
+    data: Data,
+    start: Array,
+    bounds: tuple[Array, Array],
+    beginning: tuple[Curves, NDArray[np.bool_]] | None,
+) -> tuple[Array, Array]:
+    """The unknowns (m,) with which the whole is fitted first, and deviations (series,) of the noise there."""
     if data.measured.size < start.size:
         raise ParameterError(
             f"The record has {data.measured.size} values for {start.size} unknowns. Give more, or fewer unknowns."
         )
-    unknowns, evaluations, message = start, 0, ""
-    deviations = data.deviations
     residuals = curves.values(start) - data.measured
     if not np.isfinite(residuals).all():
         raise SimulationError("At the start values the motion has no finite values. Start from other values.")
-    weights = _noise(residuals, data, 0) if deviations is None else deviations
+    weights = _noise(residuals, data, 0) if data.deviations is None else data.deviations
+    if beginning is None or not beginning[1].any():
+        return start, weights
+    unknowns = _led(curves, data, weights, start, bounds, *beginning)
+    return unknowns, _noise(curves.values(unknowns) - data.measured, data, 0) if data.deviations is None else weights
+
+
+def _settled(
+    curves: Curves, data: Data, unknowns: Array, weights: Array, bounds: tuple[Array, Array]
+) -> tuple[Any, Array, int, str]:
+    """Scipy's last result, deviations (series,), motions computed, and why it is no minimum, if it is none."""
+    alone = weights.size == 1 and data.loss == "linear" and np.isnan(data.priors).all()
+    settled, evaluations, message = data.deviations is not None or alone, 0, ""
+    # A ten-thousandth of its deviation is the last step, which derivatives tell to more than that.
+    last_gain = 1e-8 / data.measured.size
     rounds = 30  # deviations and unknowns settle in some five
     for _ in range(rounds):
-        result = _fitted(curves, data, weights, unknowns, bounds)
+        # While the deviations change, the minimum moves with them.
+        last, result = settled, _fitted(curves, data, weights, unknowns, bounds, last_gain if settled else 1e-5)
         evaluations += int(result.nfev)
         message = "" if result.status > 0 else str(result.message).rstrip(".")
-        unknowns, residuals = result.x, curves.values(result.x) - data.measured
-        if deviations is not None:
-            break
-        before, weights = weights, _noise(residuals, data, unknowns.size)
-        alone = weights.size == 1 and data.loss == "linear" and np.isnan(data.priors).all()
-        if alone or (np.abs(weights - before) <= 1e-3 * weights).all():
-            break
-    else:
-        message = message or f"the noise has not settled in {rounds} rounds"
-    at_bounds = result.active_mask != 0
-    covariance, directions, spreads = _spread(curves.slopes(unknowns), residuals, data, weights, at_bounds)
-    return Estimate(unknowns, covariance, weights, residuals, directions, spreads, at_bounds, evaluations, message)
+        unknowns = result.x
+        if data.deviations is None:
+            residuals = result.fun[: data.measured.size] * weights[data.series]
+            before, weights = weights, _noise(residuals, data, unknowns.size)
+            settled = alone or bool((np.abs(weights - before) <= 1e-4 * weights).all())
+        if settled and last:
+            return result, weights, evaluations, message
+    return result, weights, evaluations, message or f"the noise has not settled in {rounds} rounds"
+
+
+def _last_step(
+    slopes: Array, residuals: Array, data: Data, deviations: Array, covariance: Array, unknowns: Array
+) -> Array:
+    """(m,) to the minimum, as far as derivatives that are there already tell; zero where it is no small step."""
+    pull = np.where(np.isnan(data.priors), 0.0, (unknowns - data.priors) / data.prior_deviations**2)
+    step = -covariance @ (slopes.T @ (residuals / deviations[data.series] ** 2) + pull)
+    return step * (np.abs(step) <= 1e-4 * np.sqrt(np.diag(covariance))).all()
+
+
+def _led(
+    curves: Curves,
+    data: Data,
+    deviations: Array,
+    start: Array,
+    bounds: tuple[Array, Array],
+    part: Curves,
+    rows: NDArray[np.bool_],
+) -> Array:
+    """(m,) the unknowns that fit a part of the record, if they fit the whole better than the start does.
+
+    What the part does not tell stays near the start, within some 30 percent, or near its prior.
+    """
+    expected = np.where(np.isnan(data.priors), start, data.priors)
+    spreads = np.where(np.isnan(data.priors), 0.3, data.prior_deviations)
+    measured, series = data.measured[rows], data.series[rows]
+    within = Data(measured, series, deviations, expected, spreads, data.loss)
+    nearer = np.asarray(_fitted(part, within, deviations, start, bounds, 1e-2).x)
+    far, near = (((curves.values(at) - data.measured) / deviations[data.series]) ** 2 for at in (start, nearer))
+    return nearer if near.sum() < far.sum() else start
 
 
 def _noise(residuals: Array, data: Data, unknowns: int) -> Array:
@@ -147,8 +219,13 @@ def _noise(residuals: Array, data: Data, unknowns: int) -> Array:
     return np.maximum(sizes, 1e-12 * np.maximum(heights, np.finfo(float).tiny))
 
 
-def _fitted(curves: Curves, data: Data, deviations: Array, start: Array, bounds: tuple[Array, Array]) -> Any:
-    """Scipy's result; its cost counts priors without a loss."""
+def _fitted(
+    curves: Curves, data: Data, deviations: Array, start: Array, bounds: tuple[Array, Array], gain: float
+) -> Any:
+    """Scipy's result; its cost counts priors without a loss.
+
+    It ends where one more step would lower the cost by less than a part `gain`.
+    """
     scale, expected = 1 / deviations[data.series], ~np.isnan(data.priors)
     apart = np.eye(start.size)[expected] / data.prior_deviations[expected, None]
 
@@ -157,7 +234,14 @@ def _fitted(curves: Curves, data: Data, deviations: Array, start: Array, bounds:
         return np.concatenate([(curves.values(unknowns) - data.measured) * scale, beside])
 
     def slopes(unknowns: Array) -> Array:
-        return np.vstack([curves.slopes(unknowns) * scale[:, None], apart])
+        J, r = np.vstack([curves.slopes(unknowns) * scale[:, None], apart]), away(unknowns)
+        Q, R = np.linalg.qr(J)
+        lower = Q.T @ r
+        if data.loss == "linear" and lower @ lower <= gain * (r @ r) and np.linalg.cond(R) < 1 / EQUAL:
+            end = unknowns - np.linalg.solve(R, lower)
+            if (bounds[0] < end).all() and (end < bounds[1]).all():
+                return np.zeros_like(J)  # which tells scipy that this is the minimum
+        return J
 
     def loss(z: Array) -> Array:
         rho = np.array(LOSSES["linear"](z))
@@ -172,8 +256,8 @@ def _fitted(curves: Curves, data: Data, deviations: Array, start: Array, bounds:
         loss="linear" if data.loss == "linear" else loss,
         x_scale="jac",
         xtol=EQUAL,
-        ftol=TYPED,
-        gtol=None,
+        ftol=max(gain, TYPED),
+        gtol=EPS,
         max_nfev=200,
     )
 

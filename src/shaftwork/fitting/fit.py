@@ -3,51 +3,55 @@
 from __future__ import annotations
 
 import math
-import reprlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shaftwork.codegen.array_form.elements import Array
+from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.parameters import Parameter, in_si, is_quantity
-from shaftwork.fitting.curves import RecordedResponse, ScaledCurves, Scaling, Source, recorded_motion
+from shaftwork.core.parameters import Parameter, in_si
+from shaftwork.fitting.curves import (
+    RecordedMotion,
+    RecordedResponse,
+    ScaledCurves,
+    Scaling,
+    Source,
+    recorded_motion,
+    sizes_of,
+)
 from shaftwork.fitting.estimation import LOSSES, Data, estimate
 from shaftwork.fitting.fit_result import AT_START, Fit
+from shaftwork.fitting.records import RecordedSeries, read_records
 from shaftwork.network.netlist import Netlist
-from shaftwork.pipeline.arguments import checked_parameter, relative_tolerance, repeated
+from shaftwork.pipeline.arguments import checked_parameter, checked_parameters, range_of, relative_tolerance, repeated
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import refuse_motion
-from shaftwork.pipeline.network import Network, network_of, with_values
-from shaftwork.results.observer import array_in_si
+from shaftwork.pipeline.network import Network, network_of
+from shaftwork.results.solution import Solution
 
 Range = tuple[float | None, float | None]
-
-
-class _Series(NamedTuple):
-    """One recorded quantity.
-
-    Args:
-        at: (k,) times in s, or frequencies in Hz.
-        measured: (k,) values, or (2 k,) real parts before imaginary ones.
-    """
-
-    at: Array
-    measured: Array
+OfEach = Mapping[str, float] | Sequence[Mapping[str, float]] | None
+"""Values by name, for all records or one mapping for each."""
+_MODELS = BoundedCache[Netlist, Model](1)
+"""Of the network that was fitted last."""
 
 
 def fit(
     net: Network,
-    record: Mapping[str, Any],
+    record: Mapping[str, Any] | Sequence[Mapping[str, Any]],
     unknowns: Sequence[str] | Mapping[str, Range | None],
     *,
     start: Mapping[str, float] | None = None,
     sigma: float | Mapping[str, float] | None = None,
     priors: Mapping[str, tuple[float, float]] | None = None,
     loss: str = "linear",
-    initial: Mapping[str, float] | None = None,
-    at: Mapping[str, float] | None = None,
+    initial: OfEach = None,
+    parameters: OfEach = None,
+    at: OfEach = None,
     rtol: float = 1e-6,
 ) -> Fit:
     """Find parameters of a network from a record of its motion, or of its frequency response.
@@ -65,15 +69,16 @@ def fit(
         net: the network.
         record: {"t": times in s, "shaft.tau": values, ...}, also a pandas data frame; NaN is no value. Times count from
             the start of the motion. Or {"f": frequencies in Hz, "shaft.tau / motor.tau": complex values}, output over
-            input. Values in SI.
+            input. Values in SI. Or a list of such records, which are fitted together.
         unknowns: names, ["shaft.c", "shaft.d"], also of states whose start values are unknown, "J1.omega"; or by name
             (low, high), None leaves a side open.
         start: values of unknowns to start from; by default those of the network, and of `initial`.
         sigma: standard deviation of the noise in SI, one or by quantity; by default it is estimated from the record.
         priors: by name (value, standard deviation), what is known of an unknown without the record.
         loss: "linear", or for records with outliers "soft_l1", "huber" or "cauchy", see scipy's `least_squares`.
-        initial: start values of states.
-        at: for a frequency response, the point, as for `Model.linearize`.
+        initial: start values of states; of several records a list, one mapping for each, where they differ.
+        parameters: values of other parameters where they differ from the network's, likewise one or a list.
+        at: for a frequency response, the point, as for `Model.linearize`, likewise.
         rtol: relative tolerance of the derivatives; motions are computed a hundred times closer.
 
     Raises:
@@ -81,17 +86,32 @@ def fit(
         SignalError: there is no such quantity.
         SimulationError: the motion at the start cannot be computed.
     """
-    refuse_motion(initial, "fit")
-    ranges = _ranges(network_of(net).netlist(), net.compile(), unknowns)
-    net, initial = _begun(net, tuple(ranges), start or {}, initial or {})
-    fitted = _unknowns(net, ranges, initial)
-    domain, series = _series(record)
+    domain, records = read_records(record)
+    initials, others, points = (
+        _of_each(name, given, len(records))
+        for name, given in (("initial", initial), ("parameters", parameters), ("at", at))
+    )
+    for states in initials:
+        refuse_motion(states, "fit")
+    model = _MODELS(network_of(net).netlist(), net.compile)
+    names, usual = _names(unknowns), initials[0] or {}
+    model, begun = _begun(model, names, start or {})
+    spans = unknowns if isinstance(unknowns, Mapping) else dict.fromkeys(names)
+    ranges = {name: _range(model, name, spans[name]) for name in names}
+    first = {name: begun.get(name, model.parameters.get(name, usual.get(name, 0.0))) for name in names}
+    series = {name: one for each in records for name, one in each.items()}
+    sources = [
+        _source(_with(model, values, first), domain, each, first, relative_tolerance(rtol), states, point)
+        for each, states, values, point in zip(records, initials, others, points, strict=True)
+    ]
+    measured = np.concatenate([one.measured for one in series.values()])
+    fitted = _unknowns(model, ranges, first, sizes_of(first, sources, measured))
+    curves = ScaledCurves(sources, fitted.scaling)
+    data = _data(tuple(series.values()), sigma, *_priors(priors, fitted.scaling), loss)
+    bounds, beginning = (fitted.low, fitted.high), _beginning(sources, fitted.scaling)
+    estimated = estimate(curves, data, fitted.start, bounds, beginning)
     samples = {name: one.at for name, one in series.items()}
-    source = _source(net, domain, samples, fitted.scaling.names, relative_tolerance(rtol), initial, at)
-    curves = ScaledCurves(source, fitted.scaling)
-    data = _data(series, sigma, *_priors(priors, fitted.scaling), loss)
-    estimated = estimate(curves, data, fitted.start, (fitted.low, fitted.high))
-    return Fit(net, fitted.units, fitted.scaling, samples, data, estimated, domain, initial, curves.by_differences)
+    return Fit(net, fitted.units, fitted.scaling, samples, data, estimated, domain, usual, curves.by_differences)
 
 
 class _Unknowns(NamedTuple):
@@ -112,44 +132,76 @@ class _Unknowns(NamedTuple):
     high: Array
 
 
+def _of_each(name: str, given: Any, count: int) -> Sequence[Any]:
+    """What is given for each record, where it may be given once for all.
+
+    Raises:
+        ParameterError: there are more or fewer, or one is something else than values by name.
+    """
+    each = given if isinstance(given, list | tuple) else [given] * count
+    if len(each) != count:
+        raise ParameterError(f"{name} has {len(each)} entries for {count} records. Give one for each, or one for all.")
+    if others := [one for one in each if not isinstance(one, Mapping | Solution | None)]:
+        raise ParameterError(f"{name} must be values by name, such as {{'J1.omega': 8.0}}, not {others[0]!r}.")
+    return each
+
+
+def _with(model: Model, values: Mapping[str, float] | None, unknowns: Mapping[str, float]) -> Model:
+    """The model with other values of parameters that are not fitted."""
+    if both := [name for name in values or {} if name in unknowns]:
+        raise ParameterError(f"'{both[0]}' is unknown and has a value in parameters. Leave it out of one of them.")
+    return model.variant(checked_parameters(model.netlist, values)) if values else model
+
+
+def _beginning(sources: Sequence[Source], scale: Scaling) -> tuple[ScaledCurves, NDArray[np.bool_]] | None:
+    """The first part of all records, and which values it holds; None where one has none of its own."""
+    motions = [source for source in sources if isinstance(source, RecordedMotion)]
+    if len(motions) < len(sources):
+        return None
+    parts = [motion.beginning() for motion in motions]
+    curves = ScaledCurves([part for part, rows in parts if rows.any()], scale)
+    return curves, np.concatenate([rows for _, rows in parts])
+
+
 def _source(
-    net: Network,
+    model: Model,
     domain: str,
-    samples: Mapping[str, Array],
-    names: Sequence[str],
+    series: Mapping[str, RecordedSeries],
+    start: Mapping[str, float],
     rtol: float,
-    initial: Mapping[str, float],
+    initial: Mapping[str, float] | None,
     at: Mapping[str, float] | None,
 ) -> Source:
+    samples = {one.quantity: one.at for one in series.values()}
     if domain == "t":
         if at is not None:
             raise ParameterError("at = ... is the point of a frequency response. Of a motion give initial = {...}.")
-        return recorded_motion(net, samples, names, initial, rtol)
+        return recorded_motion(model, samples, start, initial or {}, rtol)
     if initial:
         raise ParameterError(f"'{next(iter(initial))}' is a start value, which a frequency response has not. Give at.")
-    return RecordedResponse(net.compile(), {_pair(name): f for name, f in samples.items()}, at)
+    return RecordedResponse(model, {_pair(name): f for name, f in samples.items()}, at)
 
 
-def _begun(
-    net: Network, names: Sequence[str], start: Mapping[str, float], initial: Mapping[str, float]
-) -> tuple[Network, dict[str, float]]:
-    """The network and the start values of its states from which the fit starts."""
+def _begun(model: Model, names: Iterable[str], start: Mapping[str, float]) -> tuple[Model, dict[str, float]]:
+    """The model whose structure is that of the values from which the fit starts, and these values, in SI."""
     if others := [name for name in start if name not in names]:
         raise ParameterError(f"'{others[0]}' has a start and is not unknown. Unknown are: {', '.join(names)}.")
-    states = {name: float(value) for name, value in start.items() if name not in net.compile().parameters}
-    values = {name: value for name, value in start.items() if name not in states}
-    return (with_values(net, values) if values else net), {**initial, **states}
+    states = {name: in_si(f"start of '{name}'", start[name], "1") for name in _states(model) if name in start}
+    values = checked_parameters(model.netlist, {name: start[name] for name in start if name not in states})
+    return (model.variant(values) if model.changes_structure(values) else model), {**values, **states}
 
 
-def _unknowns(net: Network, ranges: Mapping[str, Range], initial: Mapping[str, float]) -> _Unknowns:
+def _states(model: Model) -> list[str]:
+    return [state.name for state in model.form.states]
+
+
+def _unknowns(model: Model, ranges: Mapping[str, Range], start: Mapping[str, float], sizes: Array) -> _Unknowns:
     """What is fitted, within its bounds.
 
     Raises:
         ParameterError: the start is not between them.
     """
-    model, netlist = net.compile(), net.netlist()
-    start = {name: model.parameters.get(name, initial.get(name, 0.0)) for name in ranges}
-    declared = {name: _declared(netlist, name) if name in model.parameters else None for name in ranges}
+    declared = {name: _declared(model.netlist, name) if name in model.parameters else None for name in ranges}
     ends = {name: _ends(declared[name], span) for name, span in ranges.items()}
     for name, (low, high) in ends.items():
         if not low < start[name] < high:
@@ -157,44 +209,45 @@ def _unknowns(net: Network, ranges: Mapping[str, Range], initial: Mapping[str, f
                 f"'{name}' = {start[name]:g} is where the fit starts, and must lie between {low:g} and {high:g}. Give "
                 "another one, start={...}, or another range."
             )
-    scaling = Scaling(start, np.array([start[name] > 0 <= low for name, (low, _) in ends.items()]))
+    scaling = Scaling(start, np.array([start[name] > 0 <= low for name, (low, _) in ends.items()]), sizes)
     units = {name: AT_START if parameter is None else parameter.unit for name, parameter in declared.items()}
     sides = (np.array(values) for values in (list(start.values()), *zip(*ends.values(), strict=True)))
     return _Unknowns(scaling, units, *map(scaling.unknowns, sides))
 
 
-def _ranges(netlist: Netlist, model: Model, unknowns: Any) -> dict[str, Range]:
-    """Low and high by name, in SI.
+def _names(unknowns: Any) -> list[str]:
+    """Those of the unknowns.
 
     Raises:
-        ParameterError: there is no such parameter, it is named twice, or a range is none.
+        ParameterError: there is none, or one is named twice.
     """
-    listed = [unknowns] if isinstance(unknowns, str) else list(unknowns)
+    listed = [unknowns] if isinstance(unknowns, str) else [str(name) for name in unknowns]
     if not listed:
         raise ParameterError("Nothing is unknown. Name what to fit, such as ['shaft.c', 'shaft.d'].")
-    if twice := repeated(map(str, listed)):
+    if twice := repeated(listed):
         raise ParameterError(f"'{twice}' is named twice. Name each unknown once.")
-    return {
-        name: _range(netlist, model, name, unknowns[name] if isinstance(unknowns, Mapping) else None) for name in listed
-    }
+    return listed
 
 
-def _range(netlist: Netlist, model: Model, name: str, span: Any) -> Range:
-    """Low and high of one, in SI."""
-    is_start = name in {state.name for state in model.form.states}
-    if not is_start:
-        checked_parameter(netlist, name, model.parameters.get(name))  # says which there are
+def _range(model: Model, name: str, span: Any) -> Range:
+    """Low and high of one, in SI.
+
+    Raises:
+        ParameterError: there is no such parameter, or a range is none.
+    """
+    states = _states(model)
+    if name in model.form.graph.zeros:
+        raise ParameterError(f"'{name}' is zero, so it is in no equation. Give the value to start from, start={{...}}.")
+    if name not in states and name not in model.parameters:
+        raise ParameterError(
+            f"There is no parameter '{name}' with a number. There are: {', '.join(model.parameters)}. States, whose "
+            f"start values may be unknown, are: {', '.join(states)}."
+        )
     if span is None:
         return None, None
-    if not (isinstance(span, Sequence) and not isinstance(span, str) and len(span) == 2):
-        raise ParameterError(f"'{name}': {span!r} is no range. Give (low, high); None leaves a side open.")
-    low, high = (
-        end if end is None else in_si(name, end, "1") if is_start else checked_parameter(netlist, name, end)
-        for end in span
+    return range_of(
+        name, span, partial(in_si, name) if name in states else partial(checked_parameter, model.netlist, name)
     )
-    if low is not None and high is not None and low >= high:
-        raise ParameterError(f"'{name}': ({low:g}, {high:g}) is no range. The first must be less than the second.")
-    return low, high
 
 
 def _declared(netlist: Netlist, name: str) -> Parameter:
@@ -208,54 +261,6 @@ def _ends(parameter: Parameter | None, span: Range) -> tuple[float, float]:
     lows = [end for end in (span[0], *declared) if end is not None]
     highs = [end for end in (span[1], parameter.at_most if parameter else None) if end is not None]
     return max(lows, default=-np.inf), min(highs, default=np.inf)
-
-
-def _series(record: Any) -> tuple[str, dict[str, _Series]]:
-    """Whether over times "t" or frequencies "f", and what is recorded there, in ascending order.
-
-    Raises:
-        ParameterError: there is neither or both, a column has another length, or no value.
-    """
-    if not hasattr(record, "items"):
-        raise ParameterError(f"{reprlib.repr(record)} is no record. Give {{'t': times, 'shaft.tau': values}}.")
-    columns = {str(name): values for name, values in record.items()}
-    domains = [name for name in ("t", "f") if name in columns]
-    if len(domains) != 1 or len(columns) < 2:
-        raise ParameterError(
-            "A record has a column 't' of times in s or 'f' of frequencies in Hz, and beside it what was measured. "
-            f"There are: {', '.join(columns) or 'none'}."
-        )
-    domain = domains[0]
-    at = array_in_si(domain, _plain(columns.pop(domain)), {"t": "s", "f": "Hz"}[domain])
-    if not (at.size and np.isfinite(at).all() and at.min() >= 0.0):
-        raise ParameterError(f"'{domain}' must be numbers from zero on. A motion starts at t = 0 s.")
-    return domain, {name: _one_series(name, column, at, domain) for name, column in columns.items()}
-
-
-def _one_series(name: str, column: Any, at: Array, domain: str) -> _Series:
-    """A column in ascending order, without what is missing."""
-    if is_quantity(column):
-        raise ParameterError(f"'{name}' has a unit. Give plain numbers in SI.")
-    values = np.asarray(_plain(column))
-    if domain == "t" and np.iscomplexobj(values):
-        raise ParameterError(f"'{name}' is complex: a frequency response has a column 'f' in place of 't'.")
-    if values.shape != at.shape:
-        raise ParameterError(f"'{name}' has {values.shape} values, and '{domain}' {at.shape}. They must be as many.")
-    order = np.argsort(at, kind="stable")
-    try:
-        ordered = values[order].astype(float if domain == "t" else complex)
-    except (TypeError, ValueError):
-        raise ParameterError(f"'{name}' holds something else than numbers: {reprlib.repr(column)}.") from None
-    there = np.isfinite(ordered)
-    if not there.any():
-        raise ParameterError(f"'{name}' has no finite value.")
-    parts = [ordered] if domain == "t" else [ordered.real, ordered.imag]
-    return _Series(at[order][there], np.concatenate([part[there] for part in parts]))
-
-
-def _plain(values: Any) -> Any:
-    """A column of a data frame as an array."""
-    return values.to_numpy() if hasattr(values, "to_numpy") else values
 
 
 def _pair(name: str) -> tuple[str, str]:
@@ -298,9 +303,10 @@ def _priors(priors: Mapping[str, tuple[float, float]] | None, scale: Scaling) ->
     return np.where(there, scaled, np.nan), deviations / scale.slopes(scaled)
 
 
-def _data(series: Mapping[str, _Series], sigma: Any, priors: Array, prior_deviations: Array, loss: str) -> Data:
+def _data(series: Sequence[RecordedSeries], sigma: Any, priors: Array, prior_deviations: Array, loss: str) -> Data:
     if loss not in LOSSES:
         raise ParameterError(f"There is no loss {loss!r}. Take one of: {', '.join(LOSSES)}.")
-    measured = [one.measured for one in series.values()]
-    numbers = np.repeat(np.arange(len(series)), [values.size for values in measured])
-    return Data(np.concatenate(measured), numbers, _deviations(sigma, tuple(series)), priors, prior_deviations, loss)
+    measured = np.concatenate([one.measured for one in series])
+    numbers = np.repeat(np.arange(len(series)), [one.measured.size for one in series])
+    deviations = _deviations(sigma, [one.quantity for one in series])
+    return Data(measured, numbers, deviations, priors, prior_deviations, loss)

@@ -12,6 +12,7 @@ from scipy import stats
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.notebook import html_table
+from shaftwork.core.screen import counted, in_columns
 from shaftwork.fitting.curves import Scaling
 from shaftwork.fitting.estimation import Data, Estimate
 from shaftwork.pipeline.network import Network, with_values
@@ -30,14 +31,14 @@ class Fit:
     """Parameters of a network that fit a record.
 
     Args:
-        network: with the values that the fit began with.
+        network: that was fitted.
         units: of the unknowns by name; `AT_START` of start values.
         scaling: of the unknowns, with the values that the fit began with.
         samples: by quantity, times (k,) in s or frequencies in Hz.
         data: what was measured.
         estimate: what was found, in scaled unknowns.
         domain: "t" or "f".
-        initial: start values of states.
+        initial: start values of states; of several records those of the first.
         by_differences: whether some derivatives had to be had by differences.
     """
 
@@ -96,8 +97,7 @@ class Fit:
         quantile = (1 + level) / 2
         width = stats.norm.ppf(quantile) if self.data.deviations is not None else stats.t.ppf(quantile, max(freedom, 1))
         reach = width * np.sqrt(np.diag(self.estimate.covariance))
-        with np.errstate(over="ignore"):  # of what is not known at all
-            low, high = (self.scaling.values(self.estimate.unknowns + sign * reach) for sign in (-1.0, 1.0))
+        low, high = (self.scaling.values(self.estimate.unknowns + sign * reach) for sign in (-1.0, 1.0))
         return dict(zip(self.scaling.names, zip(low.tolist(), high.tolist(), strict=True), strict=True))
 
     @property
@@ -143,11 +143,11 @@ class Fit:
     @property
     def correlation(self) -> dict[str, float]:
         """Of neighbouring residuals by quantity: within 2 / sqrt(k) of zero where what is left is white noise."""
-        found = {}
+        correlations = {}
         for name, values in self.residuals.items():
             power = float((np.abs(values) ** 2).sum())
-            found[name] = float((values[1:] * values[:-1].conj()).sum().real) / power if power else 0.0
-        return found
+            correlations[name] = float((values[1:] * values[:-1].conj()).sum().real) / power if power else 0.0
+        return correlations
 
     def plot(self) -> Figure:
         """What was measured and computed, and below it the residuals (extra `plot`).
@@ -175,7 +175,8 @@ class Fit:
     def _rows(self) -> tuple[str, list[str], list[list[str]], list[str]]:
         """Title, headings, rows and notes."""
         names, level = ", ".join(self.samples), 0.95
-        title = f"{self.network.name}: {len(self.values)} unknowns from {self.data.measured.size} values of {names}"
+        unknowns, size = counted(len(self.values), "unknown"), self.data.measured.size
+        title = f"{self.network.name}: {unknowns} from {size} values of {names}"
         rows = [
             [name, f"{value:.6g}", f"{low:.6g}", f"{high:.6g}", f"{self.scaling.start[name]:.6g}", self.units[name]]
             for (name, value), (low, high) in zip(self.values.items(), self.intervals(level).values(), strict=True)
@@ -186,27 +187,20 @@ class Fit:
         ]
         for spread, shares in self.unseen:
             words = ", ".join(f"{name} {share:+.2f}" for name, share in shares.items())
-            known = "not at all" if np.isinf(spread) else f"to {100 * spread:.0f} % only"
-            notes.append(f"The record tells this combination {known}: {words}.")
+            extent = "not at all" if np.isinf(spread) else f"to {100 * spread:.0f} % only"
+            notes.append(f"The record tells this combination {extent}: {words}.")
         if self.estimate.message:
             notes.append(f"This is no minimum yet: {self.estimate.message}.")
         if self.by_differences:
             notes.append("Derivatives by differences.")
-        held = [name for name, ends in zip(self.scaling.names, self.estimate.at_bounds.tolist(), strict=True) if ends]
-        if held:
-            notes.append(f"At a bound, and without an interval: {', '.join(held)}.")
+        ended = [name for name, ends in zip(self.scaling.names, self.estimate.at_bounds.tolist(), strict=True) if ends]
+        if ended:
+            notes.append(f"At a bound, and without an interval: {', '.join(ended)}.")
         return title, ["", "fitted", "95 % from", "to", "start", "unit"], rows, notes
 
     def __str__(self) -> str:
         title, header, rows, notes = self._rows()
-        widths = [max(len(row[column]) for row in [header, *rows]) for column in range(len(header))]
-        lines = [
-            f"{row[0]:{widths[0]}}  "
-            + "  ".join(f"{cell:>{width}}" for cell, width in zip(row[1:-1], widths[1:-1], strict=True))
-            + f"  {row[-1]}"
-            for row in [header, *rows]
-        ]
-        return "\n".join([title, *lines, *notes])
+        return "\n".join([title, *in_columns([header, *rows], range(1, len(header) - 1)), *notes])
 
     def _repr_html_(self) -> str:
         title, header, rows, notes = self._rows()

@@ -43,7 +43,7 @@ class MeasuredMotion:
         self._read = {name: Measure.read(goal) for name, goal in goals.items() if isinstance(goal, str)}
         self._integrands = [item for one in self._read.values() if (item := integrand(one)) is not None]
         quantities = tuple(dict.fromkeys(one.quantity for one in self._read.values()))
-        self._motion = ParametricMotion(net, quantities, self._integrands, names, (0.0, t_end), initial, rtol)
+        self._motion = ParametricMotion(net.compile(), quantities, self._integrands, names, (0.0, t_end), initial, rtol)
         self._fixed = self._motion.model.parameters
         self._last: tuple[bytes, dict[str, tuple[float, Array]]] = b"", {}
         self.motions = 0
@@ -60,17 +60,17 @@ class MeasuredMotion:
         return self._last[1]
 
     def _computed(self, variables: Array) -> dict[str, tuple[float, Array]]:
-        values, found = self.values(variables), dict[str, tuple[float, Array]]()
+        values, results = self.values(variables), dict[str, tuple[float, Array]]()
         if self._read:
             self.motions += 1
             try:
-                found = self._measures(values)
+                results = self._measures(values)
             except (SimulationError, NetworkError):
-                found = {name: (np.nan, np.zeros(variables.size)) for name in self._read}
+                results = {name: (np.nan, np.zeros(variables.size)) for name in self._read}
         for name, goal in self._goals.items():
             if not isinstance(goal, str):
-                found[name] = self._of_parameters(goal, variables)
-        return found
+                results[name] = self._of_parameters(goal, variables)
+        return results
 
     def _measures(self, values: Mapping[str, float]) -> dict[str, tuple[float, Array]]:
         motion = self._motion.motion(values)

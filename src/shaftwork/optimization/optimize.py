@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
+from functools import partial
 from itertools import product
 from typing import Any
 
@@ -12,14 +13,14 @@ from scipy.stats import qmc
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.parameters import in_si, whole
+from shaftwork.core.parameters import whole
 from shaftwork.core.screen import progress
 from shaftwork.numerics.tolerances import TYPED
 from shaftwork.optimization.measured_motion import Goal, MeasuredMotion
 from shaftwork.optimization.optimum import Attempt, Optimum
-from shaftwork.pipeline.arguments import checked_parameter, relative_tolerance, time_span
+from shaftwork.pipeline.arguments import checked_parameter, range_of, relative_tolerance, time_span
 from shaftwork.pipeline.network import Network, network_of, with_values
-from shaftwork.sweep.sweep_result import Limits
+from shaftwork.sweep.sweep_result import Limits, limits_of
 
 OBJECTIVE = "objective"
 """The name under which a function stands that is made least."""
@@ -69,7 +70,11 @@ def optimize(
         raise ParameterError(f"starts = {starts!r} must be a whole number, 1 or more.")
     if OBJECTIVE in (functions or {}):
         raise ParameterError(f"'{OBJECTIVE}' is the name of the goal. Give the function another one.")
-    limits = _limits(require, functions or {})
+    limits = limits_of(require or {})
+    if unused := [other for other in functions or {} if other not in limits]:
+        raise ParameterError(
+            f"'{unused[0]}' is a function without limits. Give require={{'{unused[0]}': (low, high)}}."
+        )
     name = goal if isinstance(goal, str) else OBJECTIVE
     goals = {name: goal, **{other: (functions or {}).get(other, other) for other in limits}}
     _, end = time_span(0.0, t_end)
@@ -97,28 +102,11 @@ def _ranges(net: Network, variables: Any) -> dict[str, tuple[float, float]]:
         raise ParameterError("Nothing is variable. Give ranges, such as {'shaft.c': (1e4, 5e4)}.")
     netlist, ranges = network_of(net).netlist(), dict[str, tuple[float, float]]()
     for name, span in variables.items():
-        if not (isinstance(span, Sequence) and not isinstance(span, str) and len(span) == 2):
-            raise ParameterError(f"'{name}': {span!r} is no range. Give (low, high).")
-        low, high = (checked_parameter(netlist, name, end) for end in span)
-        if not low < high:
-            raise ParameterError(f"'{name}': ({low:g}, {high:g}) is no range. The first must be less than the second.")
+        low, high = range_of(name, span, partial(checked_parameter, netlist, name))
+        if low is None or high is None:
+            raise ParameterError(f"'{name}': {span!r} has an open side. Give (low, high).")
         ranges[name] = low, high
     return ranges
-
-
-def _limits(require: Mapping[str, Limits] | None, functions: Mapping[str, Goal]) -> dict[str, Limits]:
-    limits = dict(require or {})
-    for name, span in limits.items():
-        if not (isinstance(span, Sequence) and not isinstance(span, str) and len(span) == 2):
-            raise ParameterError(f"'{name}' must be within (low, high), None leaves a side open; not {span!r}.")
-        for end in span:
-            if end is not None:
-                in_si(f"a limit of '{name}'", end, "1")
-    if unused := [name for name in functions if name not in limits]:
-        raise ParameterError(
-            f"'{unused[0]}' is a function without limits. Give require={{'{unused[0]}': (low, high)}}."
-        )
-    return limits
 
 
 def _combinations(
@@ -140,9 +128,9 @@ def _starts(net: Network, ranges: Mapping[str, tuple[float, float]], count: int,
     """The network's own values first, moved into their ranges."""
     low, high = np.array(list(ranges.values())).T
     parameters = net.compile().parameters
-    own = np.clip([parameters[name] for name in ranges], low, high)
+    first = np.clip([parameters[name] for name in ranges], low, high)
     further = qmc.Sobol(len(ranges), seed=seed).random_base2(max(count - 1, 1).bit_length())[: count - 1]
-    return [own, *(low + further * (high - low))]
+    return [first, *(low + further * (high - low))]
 
 
 def _attempt(
@@ -179,7 +167,7 @@ def _attempt(
 
     sides = [(of, 1.0, ends[0]) for of, ends in limits.items()] + [(of, -1.0, ends[1]) for of, ends in limits.items()]
     aim = side(name, sign)
-    found = minimize(
+    result = minimize(
         aim["fun"],
         (start - low) / width,
         jac=aim["jac"],
@@ -188,6 +176,6 @@ def _attempt(
         method="SLSQP",
         options={"ftol": TYPED, "maxiter": 200},
     )
-    variables = low + np.clip(found.x, 0.0, 1.0) * width
+    variables = low + np.clip(result.x, 0.0, 1.0) * width
     goals = {of: value for of, (value, _) in motion.at(variables).items()}
-    return Attempt(choice, {**fixed, **motion.values(variables)}, goals, str(found.message), motion.motions - before)
+    return Attempt(choice, {**fixed, **motion.values(variables)}, goals, str(result.message), motion.motions - before)

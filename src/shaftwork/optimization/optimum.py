@@ -10,7 +10,7 @@ import numpy as np
 
 from shaftwork.core.errors import SimulationError
 from shaftwork.core.notebook import html_table
-from shaftwork.core.screen import counted
+from shaftwork.core.screen import counted, in_columns
 from shaftwork.pipeline.network import Network, with_values
 from shaftwork.sweep.sweep_result import Limits
 
@@ -117,9 +117,7 @@ class Optimum:
 
     def __str__(self) -> str:
         title, _, rows = self._rows()
-        widths = [max(len(row[column]) for row in rows) for column in range(2)]
-        lines = [f"{name:{widths[0]}}  {value:>{widths[1]}}  {said}".rstrip() for name, value, said in rows]
-        return "\n".join([title, *lines])
+        return "\n".join([title, *in_columns(rows, (1,))])
 
     def _repr_html_(self) -> str:
         return html_table(*self._rows())

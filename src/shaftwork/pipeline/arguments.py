@@ -213,6 +213,25 @@ def checked_parameters(netlist: Netlist, parameters: Mapping[str, Any]) -> dict[
     return values
 
 
+def range_of(name: str, span: Any, checked: Callable[[Any], float]) -> tuple[float | None, float | None]:
+    """Low and high that a user gave for a value, in SI; None leaves a side open.
+
+    Args:
+        name: of the value.
+        span: what the user gave.
+        checked: makes one end a number in SI.
+
+    Raises:
+        ParameterError: it is no range, or an end is not admissible.
+    """
+    if not (isinstance(span, Sequence) and not isinstance(span, str) and len(span) == 2):
+        raise ParameterError(f"'{name}': {span!r} is no range. Give (low, high); None leaves a side open.")
+    low, high = (None if end is None else checked(end) for end in span)
+    if low is not None and high is not None and not low < high:
+        raise ParameterError(f"'{name}': ({low:g}, {high:g}) is no range. The first must be less than the second.")
+    return low, high
+
+
 def checked_parameter(netlist: Netlist, name: str, value: Any) -> float:
     """A new value of a parameter "part.name", in SI and within its bounds.
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 from sympy import Dummy, Expr, Symbol
 
 from shaftwork.codegen.array_form.elements import Array
+from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import AccuracyWarning, ParameterError, SimulationError
 from shaftwork.core.notices import warn
 from shaftwork.formulation.observables import Observables
@@ -219,14 +221,23 @@ class MotionSlopes:
 
     def along(self, quantity: str, times: Array) -> Array:
         """(k, m) derivatives of a quantity at times (k,) in s; where two legs meet, in the later one."""
-        slopes, index = np.empty((len(times), self.parameters.size)), self._leg_at(times)
+        slopes = np.empty((len(times), self.parameters.size))
+        for leg, here, read, states, dx in self._last_read(times.tobytes(), lambda: tuple(self._read(times))):
+            by_states, by_parameters = self._shown(quantity, leg).along(read, states, leg.p)
+            slopes[here] = (by_states[:, None, :] @ dx)[:, 0] + by_parameters
+        return slopes
+
+    def _read(self, times: Array) -> Iterator[tuple[Leg, NDArray[np.bool_], Array, Array, Array]]:
+        """By leg: which of the times are in it, the times moved inside, states and their derivatives."""
+        index = self._leg_at(times)
         for number in np.unique(index).tolist():
             leg, here = self.legs[number], index == number
             read, states = leg.read(times[here])
-            by_states, by_parameters = self._shown(quantity, leg).along(read, states, leg.p)
-            dx = self._variations[number].at(times[here])[:, : states.shape[1]]
-            slopes[here] = (by_states[:, None, :] @ dx)[:, 0] + by_parameters
-        return slopes
+            yield leg, here, read, states, self._variations[number].at(times[here])[:, : states.shape[1]]
+
+    @cached_property
+    def _last_read(self) -> BoundedCache[bytes, tuple[tuple[Leg, NDArray[np.bool_], Array, Array, Array], ...]]:
+        return BoundedCache(1)  # several quantities are read at the same times
 
     def turning(self, quantity: str, t: float) -> float:
         """The time in s at which a quantity turns, from one that is near it; this one where it does not turn there.

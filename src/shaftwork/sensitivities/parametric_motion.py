@@ -11,6 +11,7 @@ from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import ParameterError, SignalError
 from shaftwork.formulation.sampling_instants import refuse_sampled
 from shaftwork.pipeline.arguments import Given, as_names, relative_tolerance
+from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import refuse_motion
 from shaftwork.pipeline.network import Network, network_of
 from shaftwork.results.observer import array_in_si
@@ -24,7 +25,7 @@ class ParametricMotion:
     """A motion for any values of some parameters.
 
     Args:
-        net: the network.
+        model: the compiled network.
         quantities: names of what is read.
         integrands: name and power of what is integrated over time.
         parameters: names, "shaft.c"; None for all in which the motion is smooth.
@@ -32,6 +33,7 @@ class ParametricMotion:
         initial: start values of states, which do not change with the parameters.
         rtol: relative tolerance of the derivatives; the motion is computed a hundred times closer.
         starts: states whose start values are parameters, too.
+        values: of parameters in SI, where they differ from the network's and change no structure.
 
     Raises:
         CompileError: there are no symbolic equations for a part of the way.
@@ -41,7 +43,7 @@ class ParametricMotion:
 
     def __init__(
         self,
-        net: Network,
+        model: Model,
         quantities: Sequence[str],
         integrands: Sequence[tuple[str, int]],
         parameters: Sequence[str] | None,
@@ -49,8 +51,9 @@ class ParametricMotion:
         initial: Given,
         rtol: float,
         starts: Sequence[str] = (),
+        values: Mapping[str, float] | None = None,
     ) -> None:
-        self.model, self._span, self._starts = network_of(net).compile(), span, tuple(starts)
+        self.model, self._span, self._starts = model, span, tuple(starts)
         refuse_sampled(self.model.form, "its derivatives by parameters are not followed from instant to instant")
         refuse_motion(initial, "motion_sensitivities")
         self._rtol = relative_tolerance(rtol)
@@ -63,22 +66,26 @@ class ParametricMotion:
             )
         rows_of(self.model)
         smooth_parameters(self.model, parameters, (self.model,), span)  # said before the motion is made
-        self.nominal = self.motion({})
-        """The motion for the values of the network."""
+        self.nominal = self.motion(values or {})
+        """The motion for these values."""
         names = smooth_parameters(self.model, parameters, self.nominal.models, span)
         names = without_start(self.model, names, self._initial, span, are_asked=parameters is not None)
         self.parameters = {
-            **{name: self.model.parameters[name] for name in names},
+            **{name: (values or {}).get(name, self.model.parameters[name]) for name in names},
             **{name: self._initial[name] for name in starts},
         }
-        """Values of the network, and behind them start values, in SI."""
+        """These values, and behind them start values, in SI."""
         if unknown := [name for name in quantities if name not in self.nominal.solution]:
             _ = self.nominal.solution[unknown[0]]  # raises, with what there is
         self._equations = DifferentiatedEquations(names, starts, quantities, integrands)
         self._first = self._at_start()
 
-    def motion(self, values: Mapping[str, float]) -> DifferentiatedMotion:
+    def motion(self, values: Mapping[str, float], share: float = 1.0) -> DifferentiatedMotion:
         """The motion for other values of parameters and start values in SI, which change no structure.
+
+        Args:
+            values: by name.
+            share: of the span, from its start on, that is computed.
 
         Raises:
             SimulationError: it could not be found, or a prescribed speed jumps.
@@ -86,7 +93,8 @@ class ParametricMotion:
         initial = {**self._initial, **{name: values[name] for name in self._starts if name in values}}
         values = {name: value for name, value in values.items() if name not in self._starts}
         # No engine takes a tolerance below 1e-13.
-        return motion_of(self.model, self._span, initial or None, max(1e-2 * self._rtol, 1e-13), values)
+        span = self._span[0], self._span[0] + share * (self._span[1] - self._span[0])
+        return motion_of(self.model, span, initial or None, max(1e-2 * self._rtol, 1e-13), values)
 
     def slopes(self, motion: DifferentiatedMotion, values: Mapping[str, float]) -> MotionSlopes:
         """The derivatives of the motion for some values, by the parameters and start values.
@@ -167,10 +175,11 @@ def trajectory_sensitivities(
     names = as_names(quantities)
     if not names:
         raise SignalError("No quantity is named. Give names such as 'shaft.tau'.")
-    motion = ParametricMotion(net, names, (), parameters, (0.0, float(times[-1])), initial, rtol, as_names(starts))
+    model, span = network_of(net).compile(), (0.0, float(times[-1]))
+    motion = ParametricMotion(model, names, (), parameters, span, initial, rtol, as_names(starts))
     slopes = motion.slopes(motion.nominal, {})
     return TrajectorySensitivities(
-        motion.model.name,
+        model.name,
         motion.parameters,
         times,
         {name: slopes.values(name, times) for name in names},

@@ -128,16 +128,13 @@ def motion_sensitivities(
     read = _measures(measures)
     integrands = dict.fromkeys(item for measure in read.values() if (item := integrand(measure)) is not None)
     quantities = dict.fromkeys(measure.quantity for measure in read.values())
-    motion = ParametricMotion(
-        net, tuple(quantities), tuple(integrands), _listed(parameters), time_span(0.0, t_end), initial, rtol
-    )
+    model, span = network_of(net).compile(), time_span(0.0, t_end)
+    motion = ParametricMotion(model, tuple(quantities), tuple(integrands), _listed(parameters), span, initial, rtol)
     solution, slopes = motion.nominal.solution, motion.slopes(motion.nominal, {})
     integrals = dict(zip(integrands, slopes.integrals(), strict=True))
     results = {name: measured(item, solution, slopes, integrals) for name, item in read.items()}
     values = {name: value for name, (value, _) in results.items()}
-    return MotionSensitivities(
-        motion.model.name, motion.parameters, values, {name: by for name, (_, by) in results.items()}
-    )
+    return MotionSensitivities(model.name, motion.parameters, values, {name: by for name, (_, by) in results.items()})
 
 
 def _measures(measures: Mapping[str, str] | Sequence[str]) -> dict[str, Measure]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shaftwork.core.errors import imported
+from shaftwork.core.screen import in_columns
 from shaftwork.results.observer import Array, Complex
 
 if TYPE_CHECKING:
@@ -128,10 +129,5 @@ def _frame(columns: Mapping[str, Array], names: Sequence[str], purpose: str) -> 
 def _text(title: str, header: Sequence[str], rows: Mapping[str, Array]) -> str:
     """A table whose strongest row comes first."""
     order = sorted(rows, key=lambda name: -float(np.nan_to_num(np.abs(rows[name])).max(initial=0.0)))
-    width = max([len(name) for name in order], default=0)
-    widths = [max(len(text), 9) for text in header]
-    lines = [f"{'':{width}}  " + "  ".join(text.rjust(w) for text, w in zip(header, widths, strict=True))]
-    for name in order:
-        cells = (f"{value:z.4f}".rjust(w) for value, w in zip(rows[name].tolist(), widths, strict=True))
-        lines.append(f"{name:{width}}  " + "  ".join(cells))
-    return "\n".join([title, *lines])
+    cells = [[name, *(f"{value:z9.4f}" for value in rows[name].tolist())] for name in order]
+    return "\n".join([title, *in_columns([["", *header], *cells], range(1, len(header) + 1))])

@@ -149,10 +149,10 @@ def _solved(both: Array, size: int, lengths: Array) -> Array:
     count, columns = len(both), both.shape[-1]
     h = lengths[:, None, None, None]
     # K_i = A_i (Y + h sum_j a_ij K_j) + B_i for the slopes K at the stages
-    system = -np.einsum("s,ij,sipq->sipjq", lengths, _TO_NODES, both[:, :, :size, :size])
+    system = -(lengths[:, None, None] * _TO_NODES)[:, :, None, :, None] * both[:, :, :size, None, :size]
     system = system.reshape(count, STAGES * size, STAGES * size) + np.eye(STAGES * size)
     right = both[:, :, :size].reshape(count, STAGES * size, columns)
     K = np.linalg.solve(system, right).reshape(count, STAGES, size, columns)
-    moved = h * np.einsum("ij,sjpc->sipc", _TO_NODES, K)
+    moved = h * np.tensordot(_TO_NODES, K, (1, 1)).swapaxes(0, 1)
     beside = both[:, :, size:] + both[:, :, size:, :size] @ moved
     return np.asarray(lengths[:, None, None] * np.einsum("i,sipc->spc", _TO_END, np.concatenate([K, beside], axis=2)))

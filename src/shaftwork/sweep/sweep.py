@@ -13,7 +13,7 @@ import numpy as np
 
 from shaftwork.core.errors import NetworkWarning, ParameterError
 from shaftwork.core.notices import muted
-from shaftwork.core.parameters import whole, without_unit
+from shaftwork.core.parameters import whole
 from shaftwork.core.screen import progress
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import (
@@ -31,7 +31,7 @@ from shaftwork.results.fatigue import SNLine
 from shaftwork.results.measures import Measure
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
-from shaftwork.sweep.sweep_result import VERDICTS, Limits, Sweep
+from shaftwork.sweep.sweep_result import VERDICTS, Limits, Sweep, limits_of
 from shaftwork.sweep.sweep_store import Store
 from shaftwork.sweep.sweep_task import Chunk, Index, Reader, Task, Worker, chunks
 
@@ -257,28 +257,9 @@ def _readers(measures: Measures, columns: Iterable[str]) -> dict[str, Reader]:
 
 
 def _limits(require: Mapping[str, Any] | None, readers: Mapping[str, Reader]) -> dict[str, Limits]:
-    limits: dict[str, Limits] = {}
-    for name, pair in (require or {}).items():
-        if name not in readers:
-            raise ParameterError(f"require: there is no measure '{name}'. There are: {', '.join(readers)}.")
-        for side in pair if isinstance(pair, tuple | list) else ():
-            without_unit(f"require['{name}']", side, "of the measure, as N m")
-            if isinstance(side, str | bytes):
-                raise ParameterError(
-                    f"require['{name}'] = {pair!r}: {side!r} is a text. Give a number in the SI unit of the measure."
-                )
-        try:
-            low, high = (None if side is None else float(side) for side in pair)
-        except (TypeError, ValueError):
-            raise ParameterError(
-                f"require['{name}'] = {pair!r} must be (low, high); None leaves a side open."
-            ) from None
-        if not (-math.inf if low is None else low) <= (math.inf if high is None else high):
-            raise ParameterError(
-                f"require['{name}'] = {pair!r}: no value is at least {low} and at most {high}. Write (low, high)."
-            )
-        limits[name] = (low, high)
-    return limits
+    if others := [name for name in require or {} if name not in readers]:
+        raise ParameterError(f"require: there is no measure '{others[0]}'. There are: {', '.join(readers)}.")
+    return limits_of(require or {})
 
 
 def _lines(sn: Any, readers: Mapping[str, Reader]) -> dict[str, SNLine]:

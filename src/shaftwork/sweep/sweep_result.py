@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,8 +15,8 @@ from numpy.typing import NDArray
 from shaftwork.core.errors import ParameterError, imported
 from shaftwork.core.files import replaced
 from shaftwork.core.notebook import html_table
-from shaftwork.core.parameters import whole
-from shaftwork.core.screen import ROWS, counted
+from shaftwork.core.parameters import whole, without_unit
+from shaftwork.core.screen import ROWS, counted, in_columns
 from shaftwork.results.observer import Array
 from shaftwork.results.plotting import new_figure
 
@@ -28,6 +29,34 @@ VERDICTS = ("passed", "reason")
 
 Limits = tuple[float | None, float | None]
 """The least and the most that is allowed; None leaves a side open."""
+
+
+def limits_of(require: Mapping[str, Any]) -> dict[str, Limits]:
+    """Limits that a user gave, by name.
+
+    Raises:
+        ParameterError: one is no pair of numbers, has units, or nothing lies between its sides.
+    """
+    limits: dict[str, Limits] = {}
+    for name, pair in require.items():
+        for side in pair if isinstance(pair, tuple | list) else ():
+            without_unit(f"require['{name}']", side, "of the measure, as N m")
+            if isinstance(side, str | bytes):
+                raise ParameterError(
+                    f"require['{name}'] = {pair!r}: {side!r} is a text. Give a number in the SI unit of the measure."
+                )
+        try:
+            low, high = (None if side is None else float(side) for side in pair)
+        except (TypeError, ValueError):
+            raise ParameterError(
+                f"require['{name}'] = {pair!r} must be (low, high); None leaves a side open."
+            ) from None
+        if not (-math.inf if low is None else low) <= (math.inf if high is None else high):
+            raise ParameterError(
+                f"require['{name}'] = {pair!r}: no value is at least {low} and at most {high}. Write (low, high)."
+            )
+        limits[name] = (low, high)
+    return limits
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,13 +185,7 @@ class Sweep:
 
     def __str__(self) -> str:
         counts, header, rows = self._rows(ROWS)
-        widths = [max(len(row[column]) for row in [header, *rows]) for column in range(len(header))]
-        lines = [
-            "  ".join(
-                [*(text.rjust(width) for text, width in zip(row[:-1], widths[:-1], strict=True)), row[-1]]
-            ).rstrip()
-            for row in [header, *rows]
-        ]
+        lines = in_columns([header, *rows], range(len(header) - 1))
         more = [f"and {len(self) - ROWS} more"] if len(self) > ROWS else []
         return "\n".join([counts, *lines, *more])
 

@@ -175,7 +175,7 @@ class Worker:
         """
         rows = self._task.rows(variants) if rows is None else rows
         values = np.full((variants.size, len(self._task.measures)), np.nan)
-        reasons = [self._objection(row, rows) if self._choosy else "" for row in range(variants.size)]
+        reasons = [self._objection(row, rows) if self._checked_parts else "" for row in range(variants.size)]
         open_ = np.array([not reason for reason in reasons])
         if self._ensemble is not None and open_.any():
             here = np.flatnonzero(open_)
@@ -188,7 +188,7 @@ class Worker:
         return Chunk(variants, values, tuple(reasons), left)
 
     @cached_property
-    def _choosy(self) -> list[tuple[Component, list[tuple[str, str]]]]:
+    def _checked_parts(self) -> list[tuple[Component, list[tuple[str, str]]]]:
         """Parts that check whether their values go together, with those that vary and the names of their columns.
 
         Left out are those whose check reads nothing that varies: it says the same of all variants as of the network.
@@ -203,7 +203,7 @@ class Worker:
 
     def _objection(self, row: int, rows: Mapping[str, Array]) -> str:
         """Why the values in a row of columns do not go together; empty where they do."""
-        for part, columns in self._choosy:
+        for part, columns in self._checked_parts:
             changed: Any = object.__new__(type(part))  # its values have been looked at one by one
             vars(changed).update(vars(part))
             vars(changed).update({parameter: float(rows[name][row]) for parameter, name in columns})

@@ -103,7 +103,7 @@ def bands(
         **options: of `Model.simulate`.
 
     Raises:
-        ParameterError: an argument is out of its range.
+        ParameterError: an argument is out of its range, or a sample is not admissible; says which.
         SignalError: there is no such quantity.
         SimulationError: a sample could not be simulated; says which.
     """
@@ -122,8 +122,8 @@ def bands(
             values = {name: float(column[k]) for name, column in columns.items()}
             try:
                 motion = model.simulate(float(times[-1]), parameters=values, t_eval=times, **options)
-            except SimulationError as error:
-                raise SimulationError(f"The sample {values} could not be simulated: {error}") from error
+            except (ParameterError, SimulationError) as error:
+                raise type(error)(f"The sample {values} could not be simulated: {error}") from error
             courses[k], unit = motion[quantity], motion.observer.units[quantity]
             show(k + 1, "bands")
     return Bands(model.name, quantity, unit, times, courses, columns, level)

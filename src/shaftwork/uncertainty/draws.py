@@ -102,10 +102,13 @@ class Design:
         """SALib's analysis of a measure (rows,): each index with half of its interval."""
         analysis = imported(f"SALib.analyze.{self.method}", "uncertainty", "Uncertainty.indices()")
         if self.method == "sobol":
-            found = analysis.analyze(
+            results = analysis.analyze(
                 self.problem, values, calc_second_order=False, conf_level=level, seed=1 + self.seed
             )
-            return {name: (np.asarray(found[name]), np.asarray(found[f"{name}_conf"])) for name in ("S1", "ST")}
-        found = analysis.analyze(self.problem, self.shares, values, conf_level=level, seed=1 + self.seed)
-        size, spread = np.asarray(found["mu_star"], dtype=float), np.asarray(found["sigma"], dtype=float)
-        return {"mu*": (size, np.asarray(found["mu_star_conf"], dtype=float)), "sigma": (spread, np.zeros_like(spread))}
+            return {name: (np.asarray(results[name]), np.asarray(results[f"{name}_conf"])) for name in ("S1", "ST")}
+        results = analysis.analyze(self.problem, self.shares, values, conf_level=level, seed=1 + self.seed)
+        size, spread = np.asarray(results["mu_star"], dtype=float), np.asarray(results["sigma"], dtype=float)
+        return {
+            "mu*": (size, np.asarray(results["mu_star_conf"], dtype=float)),
+            "sigma": (spread, np.zeros_like(spread)),
+        }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -10,7 +11,7 @@ from scipy import stats
 
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.notebook import html_table
-from shaftwork.core.screen import counted
+from shaftwork.core.screen import counted, in_columns
 from shaftwork.results.observer import Array
 from shaftwork.results.plotting import new_figure, plain
 from shaftwork.sweep.sweep_result import Sweep
@@ -125,10 +126,10 @@ class Uncertainty:
             raise ParameterError(
                 f"{counted(failed, 'sample')} of {len(self)} failed, and indices need all of them; see sweep.reasons."
             )
-        found = self.design.indices(column, self.level)
+        indices = self.design.indices(column, self.level)
         return {
             index: dict(zip(self.design.names, zip(value.tolist(), half.tolist(), strict=True), strict=True))
-            for index, (value, half) in found.items()
+            for index, (value, half) in indices.items()
         }
 
     def _rows(self) -> list[list[str]]:
@@ -148,11 +149,11 @@ class Uncertainty:
             return []
         rows = list[list[str]]()
         for measure in self.measures:
-            found = self.indices(measure)
-            leading = found["ST"] if "ST" in found else found["mu*"]
-            rows.append([measure, *(text for index in found for text in (index, "+-"))])
+            indices = self.indices(measure)
+            leading = indices["ST"] if "ST" in indices else indices["mu*"]
+            rows.append([measure, *(text for index in indices for text in (index, "+-"))])
             for name in sorted(leading, key=lambda name: -leading[name][0]):
-                rows.append([name, *(f"{value:z.3g}" for by in found.values() for value in by[name])])
+                rows.append([name, *(f"{value:z.3g}" for by in indices.values() for value in by[name])])
         return rows
 
     @property
@@ -162,13 +163,8 @@ class Uncertainty:
         return f"{self.sweep.name}: {counted(len(self), 'sample')}, {failed} failed{first}"
 
     def __str__(self) -> str:
-        lines = [self._title]
-        for rows in (self._rows(), self._shares()):
-            widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-            for first, *others in rows:
-                cells = (f"{cell:>{width}}" for cell, width in zip(others, widths[1:], strict=True))
-                lines.append("  ".join([f"{first:{widths[0]}}", *cells]))
-        return "\n".join(lines)
+        tables = [in_columns(rows, range(1, len(rows[0]))) for rows in (self._rows(), self._shares()) if rows]
+        return "\n".join([self._title, *chain.from_iterable(tables)])
 
     def _repr_html_(self) -> str:
         tables = [html_table(self._title, rows[0], rows[1:]) for rows in (self._rows(), self._shares()) if rows]
@@ -190,8 +186,8 @@ class Uncertainty:
                 axes[0].set_xlabel(plain(measure))
                 axes[0].set_ylabel("samples")
             if has_indices:
-                found = self.indices(measure)
-                for shift, (index, by) in enumerate(found.items()):
+                indices = self.indices(measure)
+                for shift, (index, by) in enumerate(indices.items()):
                     values, halves = zip(*by.values(), strict=True)
                     places = np.arange(len(by)) + 0.4 * shift - 0.2
                     axes[-1].barh(places, values, 0.4, xerr=halves, label=index)

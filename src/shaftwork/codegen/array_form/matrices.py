@@ -177,14 +177,13 @@ class MatrixAssembly:
         """The inverse, block by block of connected unknowns; diagonal where nothing is coupled."""
         if blocks.rational:
             return inverse_of_fractions(matrix)
-        matrix = sparse.csr_array(matrix)
-        size = matrix.shape[0]
-        count, label = connected_components(matrix, directed=False)
         diagonal = matrix.diagonal()
-        if count == size:
+        if (matrix != 0).sum() == (diagonal != 0).sum():
             if (bad := np.flatnonzero(diagonal == 0)).size:
                 raise self._singular(branches[bad[:1]], what)
             return blocks.diagonal(1 / diagonal)
+        matrix = sparse.csr_array(matrix)
+        count, label = connected_components(matrix, directed=False)
         order = np.argsort(label, kind="stable")
         starts = np.searchsorted(label[order], np.arange(count + 1))
         rows, columns, data = [], [], []

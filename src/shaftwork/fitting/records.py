@@ -1,0 +1,89 @@
+"""Records of measurements: their columns, and values in ascending order without what is missing."""
+
+from __future__ import annotations
+
+import reprlib
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from shaftwork.codegen.array_form.elements import Array
+from shaftwork.core.errors import ParameterError
+from shaftwork.core.parameters import is_quantity
+from shaftwork.results.observer import array_in_si
+
+
+class RecordedSeries(NamedTuple):
+    """One recorded quantity.
+
+    Args:
+        quantity: its name.
+        at: (k,) times in s, or frequencies in Hz.
+        measured: (k,) values, or (2 k,) real parts before imaginary ones.
+    """
+
+    quantity: str
+    at: Array
+    measured: Array
+
+
+def read_records(record: Any) -> tuple[str, list[dict[str, RecordedSeries]]]:
+    """Whether over times "t" or frequencies "f", and what each of one or several records holds, by label.
+
+    Raises:
+        ParameterError: there is none, or one is none; some are over times and some over frequencies.
+    """
+    is_list = isinstance(record, list | tuple)
+    if is_list and not record:
+        raise ParameterError("There is no record. Give {'t': times, 'shaft.tau': values}, or several in a list.")
+    domains, records = zip(*(_read(one) for one in (record if is_list else [record])), strict=True)
+    if len(set(domains)) > 1:
+        raise ParameterError("Some records are over times and some over frequencies. Fit them one after the other.")
+    if len(records) == 1:
+        return domains[0], list(records)
+    return domains[0], [
+        {f"{name} ({number})": one for name, one in series.items()} for number, series in enumerate(records, 1)
+    ]
+
+
+def _read(record: Any) -> tuple[str, dict[str, RecordedSeries]]:
+    """Whether over times "t" or frequencies "f", and what is recorded there, in ascending order.
+
+    Raises:
+        ParameterError: there is neither or both, a column has another length, or no value.
+    """
+    if not hasattr(record, "items"):
+        raise ParameterError(f"{reprlib.repr(record)} is no record. Give {{'t': times, 'shaft.tau': values}}.")
+    columns = {str(name): values for name, values in record.items()}
+    domains = [name for name in ("t", "f") if name in columns]
+    if len(domains) != 1 or len(columns) < 2:
+        raise ParameterError(
+            "A record has a column 't' of times in s or 'f' of frequencies in Hz, and beside it what was measured. "
+            f"There are: {', '.join(columns) or 'none'}."
+        )
+    domain = domains[0]
+    at = array_in_si(domain, columns.pop(domain), {"t": "s", "f": "Hz"}[domain])
+    if not (at.size and np.isfinite(at).all() and at.min() >= 0.0):
+        raise ParameterError(f"'{domain}' must be numbers from zero on. A motion starts at t = 0 s.")
+    return domain, {name: _one_series(name, column, at, domain) for name, column in columns.items()}
+
+
+def _one_series(name: str, column: Any, at: Array, domain: str) -> RecordedSeries:
+    """A column in ascending order, without what is missing."""
+    if is_quantity(column):
+        raise ParameterError(f"'{name}' has a unit. Give plain numbers in SI.")
+    values = np.asarray(column)
+    if domain == "t" and np.iscomplexobj(values):
+        raise ParameterError(f"'{name}' is complex: a frequency response has a column 'f' in place of 't'.")
+    if values.shape != at.shape:
+        raise ParameterError(f"'{name}' has {values.shape} values, and '{domain}' {at.shape}. They must be as many.")
+    order = np.argsort(at, kind="stable")
+    try:
+        ordered = values[order].astype(float if domain == "t" else complex)
+    except (TypeError, ValueError):
+        raise ParameterError(f"'{name}' holds something else than numbers: {reprlib.repr(column)}.") from None
+    there = np.isfinite(ordered)
+    if not there.any():
+        raise ParameterError(f"'{name}' has no finite value.")
+    parts = [ordered] if domain == "t" else [ordered.real, ordered.imag]
+    return RecordedSeries(name, at[order][there], np.concatenate([part[there] for part in parts]))
