@@ -32,6 +32,7 @@ class Step(NamedTuple):
         dense: times (k,) inside the step to states (k, n), until the next step is made.
         before: steps that were made first, in which nothing is met: their ends (k,) in s and the states (k, n) there.
         clear: whether nothing is met in this one either.
+        rests: whether the motion rests at a switch, where the method passes switches by itself.
     """
 
     end: float
@@ -39,6 +40,7 @@ class Step(NamedTuple):
     dense: Dense
     before: tuple[Array, Array] | None = None
     clear: bool = False
+    rests: bool = False
 
 
 class Stepper(Protocol):
@@ -189,7 +191,7 @@ def march(problem: Problem | DaeProblem, stepper: Stepper) -> SteppedRun:
                     continue
             state = step.state if end == step.end else step.dense(np.array([end]))[0]
             stepper.take(t, end, state)
-            if (objection := pace.objection(end, rests=crossings.rests)) is not None:
+            if (objection := pace.objection(end, rests=crossings.rests or step.rests)) is not None:
                 raise failure(problem, stepper.engine, end, state, objection)
             done[-1].times.append(end)
             done[-1].states.append(state)

@@ -1,11 +1,13 @@
 """Steps of Dormand and Prince's method of order 8(5,3), many of them in one call, compiled by numba.
 
 A system is a function rates(t, x, p, dx) in machine code. What is compiled here knows it by its address, so that it is
-compiled once for all systems, and numba keeps it for other processes.
+compiled once for all systems, and numba keeps it for other processes. Numbers are copied one by one: to compile `a[:] =
+b` takes numba a second.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -13,13 +15,18 @@ import numpy as np
 from numba import njit, types
 from scipy.integrate import DOP853
 
+from shaftwork.integrate.crossings import LEFT, RESTING
 from shaftwork.numerics.machine_code import MATRIX, VECTOR, call_at
+from shaftwork.numerics.tolerances import EPS
+from shaftwork.numerics.zeros import LOOKS
 
 STAGES, FURTHER, SHAPES = 12, 3, 7
 """Stages of a step, those that dense output needs besides the slope at the end, and the shapes that make it."""
 WEIGHTS = np.vstack([DOP853.B, DOP853.E5[:STAGES], DOP853.E3[:STAGES]])
 BEFORE, AFTER = np.ascontiguousarray(DOP853.A), np.ascontiguousarray(DOP853.A_EXTRA)
 NODES, LATER, DENSE = DOP853.C.copy(), DOP853.C_EXTRA.copy(), np.ascontiguousarray(DOP853.D)
+PARTS = np.array([0.0, *LOOKS, 1.0])
+"""Where a step near a guard or a switch is looked at, as parts of it."""
 
 
 def _compiled(signature: Any) -> Callable[[Any], Any]:
@@ -34,35 +41,59 @@ def _compiled(signature: Any) -> Callable[[Any], Any]:
     return decorate
 
 
-_F = types.int64  # the address of a system
-_part = njit(error_model="numpy")
+_part = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, no_rewrites=True)
+_PLACES = types.Array(types.int64, 1, "C")
+_SYSTEM = types.Tuple((types.int64, types.int64, VECTOR, VECTOR))  # type: ignore[no-untyped-call]
+"""Addresses of its rates and of what is watched, its parameters, and the earliest and latest time in s of both."""
+_WATCH = types.Tuple((_PLACES, VECTOR, VECTOR, _PLACES))  # type: ignore[no-untyped-call]
+"""The places of what is watched; of all guards and switches the sides and offsets, with which they are heights above
+zero; and how often the motion has rested at each of the switches, and at any."""
+
+
+@_part
+def _copy(x, y):  # type: ignore[no-untyped-def]
+    for i in range(x.size):
+        y[i] = x[i]
+
+
+@_part
+def _rates(system, t, x, slope):  # type: ignore[no-untyped-def]
+    rates, _, p, span = system
+    call_at(rates, min(max(t, span[0]), span[1]), x, p, slope)
+
+
+@_part
+def _values(system, t, x, values):  # type: ignore[no-untyped-def]
+    _, watched, p, span = system
+    call_at(watched, min(max(t, span[0]), span[1]), x, p, values)
 
 
 @_part
 def _stage(slopes, count, factors, x, step, y):  # type: ignore[no-untyped-def]
     """Write into y (n,) the state at the next stage, behind `count` of them."""
-    y[:] = x
+    _copy(x, y)
     for j in range(count):
         factor = step * factors[j]
-        for i in range(x.size):
-            y[i] += factor * slopes[j, i]
+        if factor != 0:
+            for i in range(x.size):
+                y[i] += factor * slopes[j, i]
 
 
 @_part
-def _all_stages(rates, p, span, t, x, step, slopes, y, end):  # type: ignore[no-untyped-def]
+def _all_stages(system, t, x, step, slopes, y, end):  # type: ignore[no-untyped-def]
     """Write the slopes of a step whose first is known, and the state at its end."""
     for stage in range(1, STAGES):
         _stage(slopes, stage, BEFORE[stage], x, step, y)
-        call_at(rates, min(max(t + NODES[stage] * step, span[0]), span[1]), y, p, slopes[stage])
+        _rates(system, t + NODES[stage] * step, y, slopes[stage])
     _stage(slopes, STAGES, WEIGHTS[0], x, step, end)
 
 
 @_part
-def _shapes(rates, p, span, t, x, step, slopes, y, end, shapes):  # type: ignore[no-untyped-def]
+def _shapes(system, t, x, step, slopes, y, end, shapes):  # type: ignore[no-untyped-def]
     """Write what makes the dense output of a step from all its slopes, with that at the end."""
     for stage in range(FURTHER):
         _stage(slopes, STAGES + 1 + stage, AFTER[stage], x, step, y)
-        call_at(rates, min(max(t + LATER[stage] * step, span[0]), span[1]), y, p, slopes[STAGES + 1 + stage])
+        _rates(system, t + LATER[stage] * step, y, slopes[STAGES + 1 + stage])
     for i in range(x.size):
         change = end[i] - x[i]
         shapes[0, i] = change
@@ -85,79 +116,287 @@ def _inside(shapes, x, part, y):  # type: ignore[no-untyped-def]
         y[i] = x[i] + total
 
 
+@_part
+def _error(slopes, x, new, step, atol, rtol):  # type: ignore[no-untyped-def]
+    """Of a step, in parts of its tolerance."""
+    fifth, third = 0.0, 0.0
+    for i in range(x.size):
+        scale, a, b = atol[i] + rtol * max(abs(x[i]), abs(new[i])), 0.0, 0.0
+        for j in range(STAGES):
+            a += WEIGHTS[1, j] * slopes[j, i]
+            b += WEIGHTS[2, j] * slopes[j, i]
+        fifth += (a / scale) ** 2
+        third += (b / scale) ** 2
+    whole = fifth + 0.01 * third
+    return step * fifth / math.sqrt(whole * x.size) if whole > 0 else whole
+
+
+@_part
+def _first_step(system, t, x, slope, limits, atol, rtol, y, other):  # type: ignore[no-untyped-def]
+    """A first step in s of which the error is small: Hairer, section II.4."""
+    size, speed, bend, n = 0.0, 0.0, 0.0, max(x.size, 1)
+    for i in range(x.size):
+        scale = atol[i] + rtol * abs(x[i])
+        size, speed = size + (x[i] / scale) ** 2, speed + (slope[i] / scale) ** 2
+    size, speed = math.sqrt(size / n), math.sqrt(speed / n)
+    guess = min(0.01 * size / speed if size > 1e-5 and speed > 1e-5 else 1e-6, limits[1] - t)
+    for i in range(x.size):
+        y[i] = x[i] + guess * slope[i]
+    _rates(system, t + guess, y, other)
+    for i in range(x.size):
+        bend += ((other[i] - slope[i]) / (atol[i] + rtol * abs(x[i]))) ** 2
+    largest = max(speed, math.sqrt(bend / n) / guess)
+    step = max(1e-6, 1e-3 * guess) if largest <= 1e-15 else (0.01 / largest) ** 0.125
+    return min(100 * guess, step, limits[3])
+
+
+@_part
+def _height(watch, course, row, c):  # type: ignore[no-untyped-def]
+    """How far a guard is within its limit, or a switch on the side on which it starts."""
+    _, sides, offsets, _ = watch
+    return sides[c] * course[row, c] + offsets[c] if sides[c] != 0 else -abs(course[row, c])
+
+
+@_part
+def _is_near(system, watch, t, x, step, slopes, y, new, course):  # type: ignore[no-untyped-def]
+    """Whether a guard or a switch is less than twice as far from zero as it moves in a step.
+
+    Inside it the state is that of the cubic with the right values and slopes at both ends.
+    """
+    (places, sides, _, rests), last = watch, PARTS.size - 1
+    for i in range(x.size):
+        y[i] = (x[i] + new[i]) / 2 + step / 8 * (slopes[0, i] - slopes[STAGES, i])
+    _values(system, t + step / 2, y, course[1])
+    _values(system, t + step, new, course[last])
+    for c in range(sides.size - rests.size + 1, sides.size):
+        sides[c] = (course[0, c] > 0) * 1.0 - (course[0, c] < 0)
+    for c in places:
+        a, b, d = _height(watch, course, 0, c), _height(watch, course, 1, c), _height(watch, course, last, c)
+        low, high = min(a, b, d), max(a, b, d)
+        if not (low > 2 * (high - low) or (sides[c] == 0 and low == high)):
+            return True
+    return False
+
+
+@_part
+def _height_at(looks, part, c):  # type: ignore[no-untyped-def]
+    """The same at a part of a step."""
+    system, watch, t, x, step, shapes, y, course = looks
+    _inside(shapes, x, part, y)
+    _values(system, t + part * step, y, course[PARTS.size])
+    return _height(watch, course, PARTS.size, c)
+
+
+@_part
+def _look(looks):  # type: ignore[no-untyped-def]
+    """Write what is watched inside a step."""
+    system, _, t, x, step, shapes, y, course = looks
+    for row in range(1, PARTS.size - 1):
+        _inside(shapes, x, PARTS[row], y)
+        _values(system, t + PARTS[row] * step, y, course[row])
+
+
+@_part
+def _vertex(ta, a, tb, b, tc, c):  # type: ignore[no-untyped-def]
+    """Where a height may come to zero beside the second of three, or -1: as `crossings.vertices`."""
+    before, after = (b - a) / (tb - ta), (c - b) / (tc - tb)
+    bend, slope = (after - before) / (tc - ta), (before * (tc - tb) + after * (tb - ta)) / (tc - ta)
+    at = tb - slope / (2 * bend)
+    low = b > 0 and b <= a and b <= c and bend > 0 and ta < at < tc and b - slope**2 / (4 * bend) < b / 2
+    return at if low else -1.0
+
+
+@_part
+def _nears_guard(watch, course):  # type: ignore[no-untyped-def]
+    """Whether a guard is beyond its limit at a row, or may be between two."""
+    places, sides, _, rests = watch
+    for c in places:
+        if c <= sides.size - rests.size:
+            for row in range(PARTS.size):
+                if not _height(watch, course, row, c) > 0:
+                    return True
+            for row in range(1, PARTS.size - 1):
+                a, b = _height(watch, course, row - 1, c), _height(watch, course, row, c)
+                d = _height(watch, course, row + 1, c)
+                if _vertex(PARTS[row - 1], a, PARTS[row], b, PARTS[row + 1], d) >= 0:
+                    return True
+    return False
+
+
+@_part
+def _dips(looks, row, c, band):  # type: ignore[no-untyped-def]
+    """Parts of a step beside a row of it between which a switch leaves its side by more than a band; or -1."""
+    _, watch, _, _, _, _, _, course = looks
+    ta, tb, tc = PARTS[row - 1], PARTS[row], PARTS[row + 1]
+    a, b, d = _height(watch, course, row - 1, c), _height(watch, course, row, c), _height(watch, course, row + 1, c)
+    for _ in range(3):
+        at = _vertex(ta, a, tb, b, tc, d)
+        if at < 0:
+            break
+        here = _height_at(looks, at, c)
+        if here < -band:
+            return ta if at < tb else tb, at
+        if at < tb:
+            ta, a, tb, b, tc, d = (ta, a, at, here, tb, b) if here < b else (at, here, tb, b, tc, d)
+        else:
+            ta, a, tb, b, tc, d = (tb, b, at, here, tc, d) if here < b else (ta, a, tb, b, at, here)
+    return -1.0, -1.0
+
+
+@_part
+def _leaves(looks, c, band):  # type: ignore[no-untyped-def]
+    """Parts of a step between which a switch leaves its side by more than a band; -1 where it does not."""
+    _, watch, _, _, _, _, _, course = looks
+    before = 0.0
+    for row in range(1, PARTS.size):
+        here = _height(watch, course, row, c)
+        if here < -band:
+            return before, PARTS[row]
+        if here >= 0:
+            before = PARTS[row]
+        low, high = _dips(looks, row, c, band) if row < PARTS.size - 1 else (-1.0, -1.0)
+        if high >= 0:
+            return low, high
+    return -1.0, -1.0
+
+
+@_part
+def _last_on_side(looks, c, low, high):  # type: ignore[no-untyped-def]
+    """The last part of a step at which a switch is on its side, between two of which the second is not."""
+    _, _, t, _, step, _, _, _ = looks
+    while (high - low) * step > EPS * max(abs(t), abs(t + step)):
+        middle = (low + high) / 2
+        if _height_at(looks, middle, c) >= 0:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@_part
+def _met(looks, atol, rtol, uneven):  # type: ignore[no-untyped-def]
+    """The part of a step at which a switch leaves its side first, this one, and how far the tolerance moves it; or -1.
+
+    One at which the motion rests is not looked at.
+    """
+    system, (places, sides, _, rests), t, x, _, _, y, course = looks
+    for i in range(x.size):
+        y[i] = x[i] + uneven[i] * (atol[i] + rtol * abs(x[i]))
+    _values(system, t, y, course[PARTS.size + 1])
+    first, met, guards = 2.0, -1, sides.size - rests.size + 1
+    for c in places:
+        if c >= guards:
+            band = abs(course[PARTS.size + 1, c] - course[0, c])
+            rests[c - guards] *= abs(course[0, c]) <= LEFT * band
+            if rests[c - guards] < RESTING:
+                low, high = _leaves(looks, c, band)
+                if high >= 0:
+                    low = _last_on_side(looks, c, low, high) if sides[c] != 0 else 0.0
+                    if low < first:
+                        first, met = low, c
+    return first, met
+
+
+@_part
+def _end_at_switch(looks, end, limits, atol, rtol, uneven, rate):  # type: ignore[no-untyped-def]
+    """The time in s at which a step has to end for a switch, as `Crossings.cut` tells; infinite where it meets none."""
+    system, (_, sides, _, rests), t, x, step, shapes, y, course = looks
+    part, c = _met(looks, atol, rtol, uneven)
+    if c < 0:
+        return np.inf
+    time, longest, number = t + part * step, np.inf, c - (sides.size - rests.size + 1)
+    _inside(shapes, x, part, y)
+    _rates(system, time, y, rate)
+    for i in range(x.size):
+        if rate[i] != 0:
+            longest = min(longest, (atol[i] + rtol * abs(y[i])) / abs(rate[i]))
+    past, clearance = min(0.01 * longest, step), limits[4]
+    if end - time > max(4 * past, clearance):
+        rests[number] += course[0, c] == 0
+        return time + max(past, clearance / 2)
+    near = abs(course[0, c]) <= LEFT * abs(course[PARTS.size + 1, c] - course[0, c])
+    rests[number], rests[rests.size - 1] = near * (rests[number] + 1), near * (rests[rests.size - 1] + 1)
+    return end
+
+
 @_compiled(
-    types.Tuple((types.int64, types.float64, types.int64))(  # type: ignore[no-untyped-call]
-        _F, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, types.float64, VECTOR, VECTOR, MATRIX, types.float64, MATRIX
+    types.Tuple((types.int64, types.float64, types.int64, types.boolean))(  # type: ignore[no-untyped-call]
+        _SYSTEM, _WATCH, VECTOR, VECTOR, VECTOR, types.float64, VECTOR, VECTOR, VECTOR, MATRIX
     )
 )
-def advance(rates, p, span, limits, x, atol, rtol, ends, lengths, states, part, middles):  # type: ignore[no-untyped-def]
-    """Make steps until there is no room for more, the end is reached, or one becomes too small.
+def advance(system, watch, limits, x, atol, rtol, uneven, ends, lengths, states):  # type: ignore[no-untyped-def]
+    """Make steps until there is no room for more, the end is reached, a guard comes near or one becomes too small.
+
+    Each of them ends just past the first switch that it meets.
 
     Args:
-        rates: address of the system.
-        p: its parameters.
-        span: the earliest and the latest time in s at which it is evaluated.
-        limits: time at the start, end, first step and longest step, s.
+        system, watch: see `_SYSTEM` and `_WATCH`.
+        limits: time at the start, end, first step or zero, longest step and clearance, s.
         x: (n,) state at the start.
         atol: (n,) absolute tolerances.
         rtol: relative one.
+        uneven: (n,) parts of the tolerance by which states are moved.
         ends: (k,) takes the times at the ends of the steps, s.
         lengths: (k,) takes their lengths, s.
         states: (k, n) takes the states there.
-        part: of a step,
-        middles: (k, n) takes the states there; (0, n) if nobody looks at them.
 
     Returns:
-        How many steps were made, the length of the next one in s, and how many were tried.
+        How many steps were made, the length of the next one in s, how many were tried, and whether a guard may be met
+        in the last one.
     """
-    n, (t, end, step, longest) = x.size, limits
-    slopes, shapes = np.empty((STAGES + 1 + FURTHER, n)), np.empty((SHAPES, n))
-    begin, y, new = x.copy(), np.empty(n), np.empty(n)
-    call_at(rates, min(max(t, span[0]), span[1]), x, p, slopes[0])
-    count, tried, shrunk = 0, 0, False
-    while count < ends.size and t < end:
-        if not step > 10 * np.spacing(abs(t)):
+    (n, m), (t, end, step, longest, _) = (x.size, watch[1].size), limits
+    slopes, shapes, course = np.empty((STAGES + 1 + FURTHER, n)), np.empty((SHAPES, n)), np.empty((PARTS.size + 2, m))
+    begin, y, new = np.empty(n), np.empty(n), np.empty(n)
+    count, tried, shrunk, attempts, stop, near = 0, 0, False, 0, end, False
+    _copy(x, begin)
+    _rates(system, t, x, slopes[0])
+    if m:
+        _values(system, t, x, course[0])
+    if not step > 0:
+        step = _first_step(system, t, x, slopes[0], limits, atol, rtol, y, new)
+    while count < ends.size and t < end and not near:
+        if not step > 10 * EPS * abs(t):
             break
-        left = end - t
-        last = min(step, longest) >= left
-        length = left if last else min(step, longest)
-        _all_stages(rates, p, span, t, begin, length, slopes, y, new)
+        last = min(step, longest) >= stop - t
+        length = stop - t if last else min(step, longest)
+        _all_stages(system, t, begin, length, slopes, y, new)
         tried += 1
-        fifth, third = 0.0, 0.0
-        for i in range(n):
-            scale, a, b = atol[i] + rtol * max(abs(begin[i]), abs(new[i])), 0.0, 0.0
-            for j in range(STAGES):
-                a += WEIGHTS[1, j] * slopes[j, i]
-                b += WEIGHTS[2, j] * slopes[j, i]
-            fifth += (a / scale) ** 2
-            third += (b / scale) ** 2
-        whole = fifth + 0.01 * third
-        error = length * fifth / np.sqrt(whole * n) if whole > 0 else whole
+        error = _error(slopes, begin, new, length, atol, rtol)
         if not error < 1:
             step = length * (max(0.2, 0.9 * error**-0.125) if error >= 1 and error < np.inf else 0.2)
             shrunk = True
             continue
+        reached, switch = stop if last else t + length, np.inf
+        _rates(system, reached, new, slopes[STAGES])
+        if m and _is_near(system, watch, t, begin, length, slopes, y, new, course):
+            looks = (system, watch, t, begin, length, shapes, y, course)
+            _shapes(system, t, begin, length, slopes, y, new, shapes)
+            _look(looks)
+            switch = _end_at_switch(looks, reached, limits, atol, rtol, uneven, slopes[STAGES + 1])
+            if switch < reached:  # after four attempts that do not converge, half of it
+                attempts += 1
+                stop = switch if attempts <= 4 else min(switch, t + length / 2)
+                continue
+            near = _nears_guard(watch, course)
         factor = min(10.0, max(0.2, 0.9 * error**-0.125)) if error > 0 else 10.0
         step = length * (min(1.0, factor) if shrunk else factor)
-        shrunk = False
-        reached = end if last else t + length
-        call_at(rates, min(max(reached, span[0]), span[1]), new, p, slopes[STAGES])
-        if middles.shape[0]:
-            _shapes(rates, p, span, t, begin, length, slopes, y, new, shapes)
-            _inside(shapes, begin, part, middles[count])
-        ends[count], lengths[count], states[count] = reached, length, new
-        t, begin[:], slopes[0] = reached, new, slopes[STAGES]
-        count += 1
-    return count, step, tried
+        ends[count], lengths[count] = reached, length
+        _copy(new, states[count])
+        _copy(new, begin)
+        _copy(slopes[STAGES], slopes[0])
+        _copy(course[PARTS.size - 1], course[0])
+        t, stop, shrunk, attempts, count = reached, end, False, 0, count + 1
+        if switch == reached:
+            step = _first_step(system, t, begin, slopes[0], limits, atol, rtol, y, new)
+    return count, step, tried, near
 
 
-@_compiled(types.void(_F, VECTOR, MATRIX, VECTOR, VECTOR, MATRIX, types.Array(types.int64, 1, "C"), VECTOR, MATRIX))
-def between(rates, p, spans, starts, lengths, states, numbers, times, values):  # type: ignore[no-untyped-def]
+@_compiled(types.void(_SYSTEM, MATRIX, VECTOR, VECTOR, MATRIX, _PLACES, VECTOR, MATRIX))
+def between(system, spans, starts, lengths, states, numbers, times, values):  # type: ignore[no-untyped-def]
     """Write the states at times inside steps, which are made again.
 
     Args:
-        rates: address of the system.
-        p: its parameters.
+        system: see `_SYSTEM`.
         spans: (s, 2) of each step the earliest and latest time in s at which the system is evaluated.
         starts: (s,) of the steps, s.
         lengths: (s,) of the steps, s.
@@ -171,17 +410,18 @@ def between(rates, p, spans, starts, lengths, states, numbers, times, values):  
     y, end = np.empty(n), np.empty(n)
     for k in range(times.size):
         number = numbers[k]
-        t, length, x, span = starts[number], lengths[number], states[number], spans[number]
+        t, length, x = starts[number], lengths[number], states[number]
         if number != prepared:
-            call_at(rates, min(max(t, span[0]), span[1]), x, p, slopes[0])
-            _all_stages(rates, p, span, t, x, length, slopes, y, end)
-            call_at(rates, min(max(t + length, span[0]), span[1]), end, p, slopes[STAGES])
-            _shapes(rates, p, span, t, x, length, slopes, y, end, shapes)
+            here = (system[0], system[1], system[2], spans[number])
+            _rates(here, t, x, slopes[0])
+            _all_stages(here, t, x, length, slopes, y, end)
+            _rates(here, t + length, end, slopes[STAGES])
+            _shapes(here, t, x, length, slopes, y, end, shapes)
             prepared = number
         _inside(shapes, x, (times[k] - t) / length, values[k])
 
 
-@_compiled(types.void(_F, VECTOR, VECTOR, MATRIX, MATRIX))
+@_compiled(types.void(types.int64, VECTOR, VECTOR, MATRIX, MATRIX))
 def watch(watched, p, times, states, values):  # type: ignore[no-untyped-def]
     """Write what is watched at times and states.
 
