@@ -215,6 +215,7 @@ class ModeEquations:
         return Problem(
             rhs=self.right_side(p),
             jacobian=self.slopes(bound) if size else None,
+            jacobians=None if clocks or not size else lambda t, y: bound().jacobians(t, y),
             x0=none,
             t0=0.0,
             t_end=0.0,
