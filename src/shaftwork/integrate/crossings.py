@@ -208,13 +208,8 @@ class Look:
         before = int(np.flatnonzero(self.values[:row, column] * side >= 0)[-1])
         low, high = float(self.times[before]), float(self.times[row])
         tolerance = max(near, float(np.spacing(self.times[-1])))
-        ends = {low: self.values[[before], column], high: self.values[[row], column]}
-
-        def value(times: Array) -> Array:
-            t = float(times[0])
-            return ends[t] if t in ends else self.at(times)[:, column]
-
-        return zero(value, low, high, xtol=tolerance)
+        ends = self.values[[before, row], column].tolist()
+        return zero(lambda times: self.at(times)[:, column], low, high, ends=ends, xtol=tolerance)
 
 
 def vertices(times: Array, heights: Array) -> tuple[Array, NDArray[np.bool_]]:

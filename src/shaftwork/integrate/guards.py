@@ -157,8 +157,8 @@ class GuardWatch:
 
 def _zero(value: Callable[[Array], Array], low: float, high: float, ulp: float) -> float:
     """Where a function passes through zero; its end where it does not, as that is rounding away from others."""
-    first, last = value(np.array([low])), value(np.array([high]))
-    return high if first[0] * last[0] > 0 else zero(value, low, high, xtol=ulp)
+    first, last = ends = value(np.array([low, high])).tolist()
+    return high if first * last > 0 else zero(value, low, high, ends=ends, xtol=ulp)
 
 
 def share_of_tolerance(problem: Problem | DaeProblem, times: Array, states: Array) -> float:

@@ -131,13 +131,11 @@ def balance(matrix: Any, sweeps: int = 8) -> Array:
     Source: Osborne, On pre-conditioning of matrices, 1960. Powers of two, so the scaling itself does not round.
     """
     size = abs(matrix if isinstance(matrix, np.ndarray) else sparse.csr_array(matrix))
-    scale = np.ones(matrix.shape[0])
+    scale, both = np.ones(matrix.shape[0]), np.flatnonzero((size.sum(axis=1) > 0) & (size.sum(axis=0) > 0))
+    rows, columns = size[both], size[:, both].T
     for _ in range(sweeps):
-        rows = (size @ scale) / scale
-        columns = (size.T @ (1 / scale)) * scale
-        both = (rows > 0) & (columns > 0)
         # Half of the full correction: all entries move at once, and the full one would overshoot.
-        scale[both] *= (rows[both] / columns[both]) ** 0.25
+        scale[both] = (scale[both] ** 2 * (rows @ scale) / (columns @ (1 / scale))) ** 0.25
     return np.asarray(2.0 ** np.round(np.log2(scale)))
 
 

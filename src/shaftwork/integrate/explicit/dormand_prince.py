@@ -7,13 +7,14 @@ its steps it makes them again where somebody asks.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from shaftwork.core.errors import ParameterError, SimulationError
 from shaftwork.integrate.crossings import RESTING, uneven
-from shaftwork.integrate.explicit.dormand_prince_loops import advance, between, watch
+from shaftwork.integrate.explicit.dormand_prince_loops import advance, between, values_at
 from shaftwork.integrate.explicit.explicit_runs import MarchedRun, solid
 from shaftwork.integrate.problem import Array, MachineRates, Problem, Trajectory, changed
 from shaftwork.integrate.smooth_intervals import GuardedFunctions, SmoothInterval, failure, pieces
@@ -55,16 +56,20 @@ def solve(problem: Problem) -> Trajectory:
 
 
 def _watching(problem: Problem, machine: MachineRates) -> Problem:
-    """The same problem, with guards in machine code."""
+    """The same problem, with guards and rates of many states in machine code."""
     if problem.guards is None:
         return problem
 
-    def values(times: Array, states: Array) -> Array:
-        watched = np.empty((times.size, machine.guards + machine.switches))
-        watch(machine.watched.address, machine.p, times, np.ascontiguousarray(states), watched)
-        return watched[:, : machine.guards]
+    def of_many(code: Any, count: int, times: Array, states: Array) -> Array:
+        values = np.empty((times.size, count))
+        values_at(code.address, machine.p, times, np.ascontiguousarray(states), values)
+        return values
 
-    return changed(problem, guards=replace(problem.guards, values=values))
+    guards = partial(of_many, machine.watched, machine.guards + machine.switches)
+    rates = partial(of_many, machine.rates, problem.x0.size)
+    return changed(
+        problem, rates=rates, guards=replace(problem.guards, values=lambda t, x: guards(t, x)[:, : machine.guards])
+    )
 
 
 class _Taken(NamedTuple):
@@ -97,9 +102,8 @@ class _MachineDense:
 
     def __call__(self, times: Array) -> Array:
         times = np.atleast_1d(np.asarray(times, dtype=float))
-        order = np.argsort(times, kind="stable")
-        taken, last = self._taken, len(self._taken.starts) - 1
-        numbers = np.clip(np.searchsorted(self.steps, times[order], side="right") - 1, 0, last)
+        order = times.argsort(kind="stable")
+        taken, numbers = self._taken, self.steps[1:-1].searchsorted(times[order], side="right")
         values = np.empty((times.size, taken.states.shape[1]))
         between(_system(self._machine, taken.spans[0]), *taken, numbers, times[order], values)
         states = np.empty_like(values)

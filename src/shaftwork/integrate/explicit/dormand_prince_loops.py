@@ -422,15 +422,15 @@ def between(system, spans, starts, lengths, states, numbers, times, values):  # 
 
 
 @_compiled(types.void(types.int64, VECTOR, VECTOR, MATRIX, MATRIX))
-def watch(watched, p, times, states, values):  # type: ignore[no-untyped-def]
-    """Write what is watched at times and states.
+def values_at(code, p, times, states, values):  # type: ignore[no-untyped-def]
+    """Write rates or what is watched, at times and states.
 
     Args:
-        watched: address of what writes it.
+        code: its address.
         p: parameters.
         times: (k,) s.
         states: (k, n) then.
         values: (k, m) takes it.
     """
     for k in range(times.size):
-        call_at(watched, times[k], states[k], p, values[k])
+        call_at(code, times[k], states[k], p, values[k])
