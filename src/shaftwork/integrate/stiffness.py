@@ -68,8 +68,13 @@ def jacobians_at(problem: Problem, times: Array, states: Array) -> list[Any]:
         matrices = problem.jacobians(times, states)
     else:
         matrices = [problem.jacobian(t, x) for t, x in zip(times.tolist(), states, strict=True)]
-    small = states.shape[1] <= LARGEST_EIGENVALUES
-    return [one.toarray() if small and not isinstance(one, np.ndarray) else one for one in matrices]
+    return [full_where_small(matrix) for matrix in matrices]
+
+
+def full_where_small(matrix: Any) -> Any:
+    """A small matrix as a full array, which is by far the faster; a large one as it is."""
+    small = sparse.issparse(matrix) and matrix.shape[0] <= LARGEST_EIGENVALUES
+    return matrix.toarray() if small else matrix
 
 
 def first_jacobian(problem: Problem) -> Any:
