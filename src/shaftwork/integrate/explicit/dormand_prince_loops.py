@@ -69,12 +69,12 @@ def _values(system, t, x, values):  # type: ignore[no-untyped-def]
 
 
 @_part
-def _stage(slopes, count, factors, x, step, y):  # type: ignore[no-untyped-def]
-    """Write into y (n,) the state at the next stage, behind `count` of them."""
+def _stage(slopes, factors, x, step, y):  # type: ignore[no-untyped-def]
+    """Write into y (n,) the state at the next stage."""
     _copy(x, y)
-    for j in range(count):
+    for j in range(factors.size):
         factor = step * factors[j]
-        if factor != 0:
+        if factor != 0:  # those of later stages are zero
             for i in range(x.size):
                 y[i] += factor * slopes[j, i]
 
@@ -83,16 +83,16 @@ def _stage(slopes, count, factors, x, step, y):  # type: ignore[no-untyped-def]
 def _all_stages(system, t, x, step, slopes, y, end):  # type: ignore[no-untyped-def]
     """Write the slopes of a step whose first is known, and the state at its end."""
     for stage in range(1, STAGES):
-        _stage(slopes, stage, BEFORE[stage], x, step, y)
+        _stage(slopes, BEFORE[stage], x, step, y)
         _rates(system, t + NODES[stage] * step, y, slopes[stage])
-    _stage(slopes, STAGES, WEIGHTS[0], x, step, end)
+    _stage(slopes, WEIGHTS[0], x, step, end)
 
 
 @_part
 def _shapes(system, t, x, step, slopes, y, end, shapes):  # type: ignore[no-untyped-def]
     """Write what makes the dense output of a step from all its slopes, with that at the end."""
     for stage in range(FURTHER):
-        _stage(slopes, STAGES + 1 + stage, AFTER[stage], x, step, y)
+        _stage(slopes, AFTER[stage], x, step, y)
         _rates(system, t + LATER[stage] * step, y, slopes[STAGES + 1 + stage])
     for i in range(x.size):
         change = end[i] - x[i]
@@ -171,9 +171,11 @@ def _is_near(system, watch, t, x, step, slopes, y, new, course):  # type: ignore
     for c in range(sides.size - rests.size + 1, sides.size):
         sides[c] = (course[0, c] > 0) * 1.0 - (course[0, c] < 0)
     for c in places:
-        a, b, d = _height(watch, course, 0, c), _height(watch, course, 1, c), _height(watch, course, last, c)
-        low, high = min(a, b, d), max(a, b, d)
-        if not (low > 2 * (high - low) or (sides[c] == 0 and low == high)):
+        low, high, unknown = np.inf, -np.inf, 0.0
+        for row in (0, 1, last):
+            height = _height(watch, course, row, c)
+            low, high, unknown = min(low, height), max(high, height), unknown + 0 * height
+        if not (low > 2 * (high - low) + unknown or (sides[c] == 0 and low == high)):
             return True
     return False
 
