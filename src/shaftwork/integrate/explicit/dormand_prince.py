@@ -14,7 +14,7 @@ import numpy as np
 
 from shaftwork.core.errors import ParameterError, SimulationError
 from shaftwork.integrate.crossings import RESTING, uneven
-from shaftwork.integrate.explicit.dormand_prince_loops import advance, between, values_at
+from shaftwork.integrate.explicit.dormand_prince_loops import COURSE, advance, between, values_at
 from shaftwork.integrate.explicit.explicit_runs import MarchedRun, solid
 from shaftwork.integrate.problem import Array, MachineRates, Problem, Trajectory, changed
 from shaftwork.integrate.smooth_intervals import GuardedFunctions, SmoothInterval, failure, pieces
@@ -105,7 +105,7 @@ class _MachineDense:
         order = times.argsort(kind="stable")
         taken, numbers = self._taken, self.steps[1:-1].searchsorted(times[order], side="right")
         values = np.empty((times.size, taken.states.shape[1]))
-        between(_system(self._machine, taken.spans[0]), *taken, numbers, times[order], values)
+        between(_system(self._machine, 0.0, 0.0), *taken, numbers, times[order], values)
         states = np.empty_like(values)
         states[order] = values
         return states
@@ -176,9 +176,9 @@ class MachineSteps:
         return True
 
 
-def _system(machine: MachineRates, span: Array) -> tuple[int, int, Array, Array]:
-    """A system as `dormand_prince_loops` takes it."""
-    return machine.rates.address, machine.watched.address, machine.p, span
+def _system(machine: MachineRates, low: float, high: float) -> tuple[int, int, int, float, float, Array]:
+    """A system as `dormand_prince_loops` takes it, with the earliest and latest time in s at which it is evaluated."""
+    return machine.rates.address, machine.watched.address, machine.guards, low, high, machine.p
 
 
 class _MachineStepper:
@@ -197,15 +197,14 @@ class _MachineStepper:
         self._problem, self._machine, self._longest = problem, machine, longest
         self._taken, self.tried, self._steps = list[_Taken](), 0, 0
         self._clearance = CLEARANCE * float(np.spacing(max(abs(problem.t0), abs(problem.t_end))))
-        self._uneven, guards = uneven(problem.x0.size), problem.guards
-        sides, offsets = np.zeros(machine.guards + machine.switches), np.zeros(machine.guards + machine.switches)
+        self._uneven, guards, count = uneven(problem.x0.size), problem.guards, machine.guards
+        self._course = np.zeros((COURSE, count + machine.switches))
+        sides, offsets, _ = self._course[-3:]
         if guards is not None:
-            sides[: machine.guards], offsets[: machine.guards] = -guards.sides, guards.offsets
+            sides[:count], offsets[:count] = -guards.sides, guards.offsets
         watched = sides != 0
-        watched[machine.guards :] = problem.switches is not None
-        places = np.flatnonzero(watched)
-        size = sides.size if places.size else 0
-        self._watch = places, sides[:size], offsets[:size]
+        watched[count:] = problem.switches is not None
+        self._places = np.flatnonzero(watched)
 
     def dense(self, steps: Array) -> _MachineDense:
         """The motion between the ends (s + 1,) of the steps that were taken."""
@@ -213,7 +212,7 @@ class _MachineStepper:
 
     def open(self, piece: SmoothInterval, t: float, x: Array) -> Array:  # noqa: ARG002 (the loops look there)
         self._piece, self._end, self._limit, self.length = piece, piece.end, self._longest, 0.0
-        self._span, self._rests = np.array([piece.low, piece.high]), np.zeros(self._machine.switches + 1, dtype=int)
+        self._course[-1], self._rested = 0.0, 0.0
         return x
 
     def resume(self, at: MachineSnapshot, end: float) -> None:
@@ -227,9 +226,9 @@ class _MachineStepper:
         problem, x = self._problem, np.ascontiguousarray(x)
         room = max(1, min(MOST_AHEAD, problem.max_steps - self._steps))
         ends, lengths, states = np.empty(room), np.empty(room), np.empty((room, x.size))
+        limits = np.array([t, self._end, self.length, self._limit, self._clearance, self._rested])
         count, self.length, tried, near = advance(
-            _system(self._machine, self._span), (*self._watch, self._rests),
-            np.array([t, self._end, self.length, self._limit, self._clearance]),
+            _system(self._machine, self._piece.low, self._piece.high), self._places, self._course, limits,
             x, problem.atol, problem.rtol, self._uneven, ends, lengths, states,
         )  # fmt: skip
         self.tried += tried
@@ -238,12 +237,12 @@ class _MachineStepper:
         ends, states = ends[:count], states[:count]
         self._steps += count
         starts, begun = np.append(t, ends[: count - 1]), np.vstack([x, states[: count - 1]])
-        spans = np.broadcast_to(self._span, (count, 2)).copy()
+        spans = np.full((count, 2), (self._piece.low, self._piece.high))
         self._made = _Taken(spans, starts, lengths[:count].copy(), begun)
         before, last = (ends[:-1], states[:-1]) if count > 1 else None, count - 1
         dense = _MachineDense(self._machine, starts[last:], _Taken(*(values[last:] for values in self._made)))
-        rests = bool(self._rests[-1] >= RESTING)
-        return Step(ends[last], states[last], dense, before, clear=not near, rests=rests)
+        self._rested = limits[5]
+        return Step(ends[last], states[last], dense, before, clear=not near, rests=self._rested >= RESTING)
 
     def again(self, t: float, x: Array, end: float, longest: float) -> None:  # noqa: ARG002 (it starts as it did)
         self._taken.append(_Taken(*(values[:-1] for values in self._made)))

@@ -43,11 +43,12 @@ def _compiled(signature: Any) -> Callable[[Any], Any]:
 
 _part = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, no_rewrites=True)
 _PLACES = types.Array(types.int64, 1, "C")
-_SYSTEM = types.Tuple((types.int64, types.int64, VECTOR, VECTOR))  # type: ignore[no-untyped-call]
-"""Addresses of its rates and of what is watched, its parameters, and the earliest and latest time in s of both."""
-_WATCH = types.Tuple((_PLACES, VECTOR, VECTOR, _PLACES))  # type: ignore[no-untyped-call]
-"""The places of what is watched; of all guards and switches the sides and offsets, with which they are heights above
-zero; and how often the motion has rested at each of the switches, and at any."""
+_SYSTEM = types.Tuple((types.int64, types.int64, types.int64, types.float64, types.float64, VECTOR))  # type: ignore[no-untyped-call]
+"""Addresses of its rates and of what is watched, how many of that are guards, the earliest and the latest time in s at
+which both are evaluated, and their parameters."""
+COURSE = PARTS.size + 5
+"""Rows of what is watched in a step: at its parts, anywhere, at its start moved by the tolerance; the sides and offsets
+with which it is a height above zero; and how often in a row the motion has rested at a switch."""
 
 
 @_part
@@ -58,14 +59,14 @@ def _copy(x, y):  # type: ignore[no-untyped-def]
 
 @_part
 def _rates(system, t, x, slope):  # type: ignore[no-untyped-def]
-    rates, _, p, span = system
-    call_at(rates, min(max(t, span[0]), span[1]), x, p, slope)
+    rates, _, _, low, high, p = system
+    call_at(rates, min(max(t, low), high), x, p, slope)
 
 
 @_part
 def _values(system, t, x, values):  # type: ignore[no-untyped-def]
-    _, watched, p, span = system
-    call_at(watched, min(max(t, span[0]), span[1]), x, p, values)
+    _, watched, _, low, high, p = system
+    call_at(watched, min(max(t, low), high), x, p, values)
 
 
 @_part
@@ -90,7 +91,7 @@ def _all_stages(system, t, x, step, slopes, y, end):  # type: ignore[no-untyped-
 
 @_part
 def _shapes(system, t, x, step, slopes, y, end, shapes):  # type: ignore[no-untyped-def]
-    """Write what makes the dense output of a step from all its slopes, with that at the end."""
+    """Write what makes the dense output of a step from all its slopes, with that at the end; and behind it its start."""
     for stage in range(FURTHER):
         _stage(slopes, AFTER[stage], x, step, y)
         _rates(system, t + LATER[stage] * step, y, slopes[STAGES + 1 + stage])
@@ -104,16 +105,17 @@ def _shapes(system, t, x, step, slopes, y, end, shapes):  # type: ignore[no-unty
             for j in range(STAGES + 1 + FURTHER):
                 total += DENSE[row, j] * slopes[j, i]
             shapes[3 + row, i] = step * total
+        shapes[SHAPES, i] = x[i]
 
 
 @_part
-def _inside(shapes, x, part, y):  # type: ignore[no-untyped-def]
+def _inside(shapes, part, y):  # type: ignore[no-untyped-def]
     """Write the state at a part of a step."""
-    for i in range(x.size):
+    for i in range(y.size):
         total = 0.0
         for k in range(SHAPES):
             total = (total + shapes[SHAPES - 1 - k, i]) * (part if k % 2 == 0 else 1 - part)
-        y[i] = x[i] + total
+        y[i] = shapes[SHAPES, i] + total
 
 
 @_part
@@ -151,189 +153,148 @@ def _first_step(system, t, x, slope, limits, atol, rtol, y, other):  # type: ign
 
 
 @_part
-def _height(watch, course, row, c):  # type: ignore[no-untyped-def]
+def _height(course, row, c):  # type: ignore[no-untyped-def]
     """How far a guard is within its limit, or a switch on the side on which it starts."""
-    _, sides, offsets, _ = watch
-    return sides[c] * course[row, c] + offsets[c] if sides[c] != 0 else -abs(course[row, c])
+    side = course[PARTS.size + 2, c]
+    return side * course[row, c] + course[PARTS.size + 3, c] if side != 0 else -abs(course[row, c])
 
 
 @_part
-def _is_near(system, watch, t, x, step, slopes, y, new, course):  # type: ignore[no-untyped-def]
+def _is_near(system, places, t, x, step, slopes, y, new, course):  # type: ignore[no-untyped-def]
     """Whether a guard or a switch is less than twice as far from zero as it moves in a step.
 
     Inside it the state is that of the cubic with the right values and slopes at both ends.
     """
-    (places, sides, _, rests), last = watch, PARTS.size - 1
+    last, side = PARTS.size - 1, PARTS.size + 2
     for i in range(x.size):
         y[i] = (x[i] + new[i]) / 2 + step / 8 * (slopes[0, i] - slopes[STAGES, i])
     _values(system, t + step / 2, y, course[1])
     _values(system, t + step, new, course[last])
-    for c in range(sides.size - rests.size + 1, sides.size):
-        sides[c] = (course[0, c] > 0) * 1.0 - (course[0, c] < 0)
+    for c in range(system[2], course.shape[1]):
+        course[side, c] = (course[0, c] > 0) * 1.0 - (course[0, c] < 0)
     for c in places:
         low, high, unknown = np.inf, -np.inf, 0.0
         for row in (0, 1, last):
-            height = _height(watch, course, row, c)
+            height = _height(course, row, c)
             low, high, unknown = min(low, height), max(high, height), unknown + 0 * height
-        if not (low > 2 * (high - low) + unknown or (sides[c] == 0 and low == high)):
+        if not (low > 2 * (high - low) + unknown or (course[side, c] == 0 and low == high)):
             return True
     return False
 
 
 @_part
-def _height_at(looks, part, c):  # type: ignore[no-untyped-def]
-    """The same at a part of a step."""
-    system, watch, t, x, step, shapes, y, course = looks
-    _inside(shapes, x, part, y)
-    _values(system, t + part * step, y, course[PARTS.size])
-    return _height(watch, course, PARTS.size, c)
-
-
-@_part
-def _look(looks):  # type: ignore[no-untyped-def]
-    """Write what is watched inside a step."""
-    system, _, t, x, step, shapes, y, course = looks
-    for row in range(1, PARTS.size - 1):
-        _inside(shapes, x, PARTS[row], y)
-        _values(system, t + PARTS[row] * step, y, course[row])
-
-
-@_part
-def _vertex(ta, a, tb, b, tc, c):  # type: ignore[no-untyped-def]
-    """Where a height may come to zero beside the second of three, or -1: as `crossings.vertices`."""
-    before, after = (b - a) / (tb - ta), (c - b) / (tc - tb)
-    bend, slope = (after - before) / (tc - ta), (before * (tc - tb) + after * (tb - ta)) / (tc - ta)
-    at = tb - slope / (2 * bend)
-    low = b > 0 and b <= a and b <= c and bend > 0 and ta < at < tc and b - slope**2 / (4 * bend) < b / 2
-    return at if low else -1.0
-
-
-@_part
-def _nears_guard(watch, course):  # type: ignore[no-untyped-def]
-    """Whether a guard is beyond its limit at a row, or may be between two."""
-    places, sides, _, rests = watch
-    for c in places:
-        if c <= sides.size - rests.size:
-            for row in range(PARTS.size):
-                if not _height(watch, course, row, c) > 0:
-                    return True
-            for row in range(1, PARTS.size - 1):
-                a, b = _height(watch, course, row - 1, c), _height(watch, course, row, c)
-                d = _height(watch, course, row + 1, c)
-                if _vertex(PARTS[row - 1], a, PARTS[row], b, PARTS[row + 1], d) >= 0:
-                    return True
-    return False
-
-
-@_part
-def _dips(looks, row, c, band):  # type: ignore[no-untyped-def]
-    """Parts of a step beside a row of it between which a switch leaves its side by more than a band; or -1."""
-    _, watch, _, _, _, _, _, course = looks
-    ta, tb, tc = PARTS[row - 1], PARTS[row], PARTS[row + 1]
-    a, b, d = _height(watch, course, row - 1, c), _height(watch, course, row, c), _height(watch, course, row + 1, c)
-    for _ in range(3):
-        at = _vertex(ta, a, tb, b, tc, d)
-        if at < 0:
-            break
-        here = _height_at(looks, at, c)
-        if here < -band:
-            return ta if at < tb else tb, at
-        if at < tb:
-            ta, a, tb, b, tc, d = (ta, a, at, here, tb, b) if here < b else (at, here, tb, b, tc, d)
-        else:
-            ta, a, tb, b, tc, d = (tb, b, at, here, tc, d) if here < b else (ta, a, tb, b, at, here)
-    return -1.0, -1.0
+def _watched(looks, part, row):  # type: ignore[no-untyped-def]
+    """Write what is watched at a part of a step into a row."""
+    system, _, t, step, shapes, course = looks
+    _inside(shapes, part, shapes[SHAPES + 1])
+    _values(system, t + part * step, shapes[SHAPES + 1], course[row])
 
 
 @_part
 def _leaves(looks, c, band):  # type: ignore[no-untyped-def]
-    """Parts of a step between which a switch leaves its side by more than a band; -1 where it does not."""
-    _, watch, _, _, _, _, _, course = looks
-    before = 0.0
+    """Parts of a step between which a height falls below zero by more than a band; -1 where it does not.
+
+    It may between two rows, near the vertex of a parabola through three heights, as `crossings.vertices` has them.
+    """
+    _, _, _, _, _, course = looks
+    before, last = 0.0, PARTS.size - 1
     for row in range(1, PARTS.size):
-        here = _height(watch, course, row, c)
+        here = _height(course, row, c)
         if here < -band:
             return before, PARTS[row]
-        if here >= 0:
-            before = PARTS[row]
-        low, high = _dips(looks, row, c, band) if row < PARTS.size - 1 else (-1.0, -1.0)
-        if high >= 0:
-            return low, high
+        before = PARTS[row] if here >= 0 else before
+        left, right = row - 1, min(row + 1, last)
+        ta, tb, tc = PARTS[left], PARTS[row], PARTS[right]
+        a, b, d = _height(course, left, c), here, _height(course, right, c)
+        for _ in range(3):
+            first, second = (b - a) / (tb - ta), (d - b) / (tc - tb)
+            bend, slope = (second - first) / (tc - ta), (first * (tc - tb) + second * (tb - ta)) / (tc - ta)
+            at = tb - slope / (2 * bend)
+            if not (0 < b <= min(a, d) and bend > 0 and ta < at < tc and b - slope**2 / (4 * bend) < b / 2):
+                break
+            _watched(looks, at, PARTS.size)
+            new = _height(course, PARTS.size, c)
+            if new < -band:
+                return ta if at < tb else tb, at
+            if at < tb:
+                ta, a, tb, b, tc, d = (ta, a, at, new, tb, b) if new < b else (at, new, tb, b, tc, d)
+            else:
+                ta, a, tb, b, tc, d = (tb, b, at, new, tc, d) if new < b else (ta, a, tb, b, at, new)
     return -1.0, -1.0
 
 
 @_part
-def _last_on_side(looks, c, low, high):  # type: ignore[no-untyped-def]
-    """The last part of a step at which a switch is on its side, between two of which the second is not."""
-    _, _, t, _, step, _, _, _ = looks
-    while (high - low) * step > EPS * max(abs(t), abs(t + step)):
-        middle = (low + high) / 2
-        if _height_at(looks, middle, c) >= 0:
-            low = middle
-        else:
-            high = middle
-    return low
+def _first_met(looks, atol, rtol, uneven):  # type: ignore[no-untyped-def]
+    """The part of a step at which a switch leaves its side first, by bisection, and this switch, or -1; and whether a
+    guard is beyond its limit, or has no value, anywhere in the step.
 
-
-@_part
-def _met(looks, atol, rtol, uneven):  # type: ignore[no-untyped-def]
-    """The part of a step at which a switch leaves its side first, this one, and how far the tolerance moves it; or -1.
-
-    One at which the motion rests is not looked at.
+    A switch at which the motion rests is not looked at.
     """
-    system, (places, sides, _, rests), t, x, _, _, y, course = looks
-    for i in range(x.size):
-        y[i] = x[i] + uneven[i] * (atol[i] + rtol * abs(x[i]))
-    _values(system, t, y, course[PARTS.size + 1])
-    first, met, guards = 2.0, -1, sides.size - rests.size + 1
+    system, places, t, step, shapes, course = looks
+    y, moved, rests = shapes[SHAPES + 1], course[PARTS.size + 1], course[PARTS.size + 4]
+    for i in range(y.size):
+        y[i] = shapes[SHAPES, i] + uneven[i] * (atol[i] + rtol * abs(shapes[SHAPES, i]))
+    _values(system, t, y, moved)
+    first, met, near = 2.0, -1, False
     for c in places:
-        if c >= guards:
-            band = abs(course[PARTS.size + 1, c] - course[0, c])
-            rests[c - guards] *= abs(course[0, c]) <= LEFT * band
-            if rests[c - guards] < RESTING:
-                low, high = _leaves(looks, c, band)
-                if high >= 0:
-                    low = _last_on_side(looks, c, low, high) if sides[c] != 0 else 0.0
-                    if low < first:
-                        first, met = low, c
-    return first, met
+        band, guard = abs(moved[c] - course[0, c]), c < system[2]
+        if guard:
+            band = 0.0
+            for row in range(PARTS.size):
+                near |= not _height(course, row, c) > 0
+        elif abs(course[0, c]) > LEFT * band:
+            rests[c] = 0
+        low, high = _leaves(looks, c, band) if rests[c] < RESTING else (-1.0, -1.0)
+        if guard:
+            near |= high >= 0
+            continue
+        if course[PARTS.size + 2, c] == 0:
+            low, high = 0.0, min(high, 0.0)  # it leaves zero at once
+        while high - low > EPS * max(abs(t), abs(t + step)) / step:
+            middle = (low + high) / 2
+            _watched(looks, middle, PARTS.size)
+            low, high = (middle, high) if _height(course, PARTS.size, c) >= 0 else (low, middle)
+        if high >= 0 and low < first:
+            first, met = low, c
+    return first, met, near
 
 
 @_part
-def _end_at_switch(looks, end, limits, atol, rtol, uneven, rate):  # type: ignore[no-untyped-def]
-    """The time in s at which a step has to end for a switch, as `Crossings.cut` tells; infinite where it meets none."""
-    system, (_, sides, _, rests), t, x, step, shapes, y, course = looks
-    part, c = _met(looks, atol, rtol, uneven)
-    if c < 0:
-        return np.inf
-    time, longest, number = t + part * step, np.inf, c - (sides.size - rests.size + 1)
-    _inside(shapes, x, part, y)
+def _end_at_switch(looks, part, c, end, limits, atol, rtol, rate):  # type: ignore[no-untyped-def]
+    """The time in s at which a step has to end for a switch that leaves its side, as `Crossings.cut` tells."""
+    system, _, t, step, shapes, course = looks
+    y, rests = shapes[SHAPES + 1], course[PARTS.size + 4]
+    time, longest, value = t + part * step, np.inf, course[0, c]
+    _inside(shapes, part, y)
     _rates(system, time, y, rate)
-    for i in range(x.size):
+    for i in range(y.size):
         if rate[i] != 0:
             longest = min(longest, (atol[i] + rtol * abs(y[i])) / abs(rate[i]))
     past, clearance = min(0.01 * longest, step), limits[4]
     if end - time > max(4 * past, clearance):
-        rests[number] += course[0, c] == 0
+        rests[c] += value == 0
         return time + max(past, clearance / 2)
-    near = abs(course[0, c]) <= LEFT * abs(course[PARTS.size + 1, c] - course[0, c])
-    rests[number], rests[rests.size - 1] = near * (rests[number] + 1), near * (rests[rests.size - 1] + 1)
+    near = abs(value) <= LEFT * abs(course[PARTS.size + 1, c] - value)
+    rests[c], limits[5] = near * (rests[c] + 1), near * (limits[5] + 1)
     return end
 
 
 @_compiled(
     types.Tuple((types.int64, types.float64, types.int64, types.boolean))(  # type: ignore[no-untyped-call]
-        _SYSTEM, _WATCH, VECTOR, VECTOR, VECTOR, types.float64, VECTOR, VECTOR, VECTOR, MATRIX
+        _SYSTEM, _PLACES, MATRIX, VECTOR, VECTOR, VECTOR, types.float64, VECTOR, VECTOR, VECTOR, MATRIX
     )
 )
-def advance(system, watch, limits, x, atol, rtol, uneven, ends, lengths, states):  # type: ignore[no-untyped-def]
+def advance(system, places, course, limits, x, atol, rtol, uneven, ends, lengths, states):  # type: ignore[no-untyped-def]
     """Make steps until there is no room for more, the end is reached, a guard comes near or one becomes too small.
 
     Each of them ends just past the first switch that it meets.
 
     Args:
-        system, watch: see `_SYSTEM` and `_WATCH`.
-        limits: time at the start, end, first step or zero, longest step and clearance, s.
+        system: see `_SYSTEM`.
+        places: of the guards and switches that are watched, in all of them.
+        course: see `COURSE`; (COURSE, 0) where nothing is.
+        limits: time at the start, end, first step or zero, longest step and clearance, s; and how often in a row the
+            motion has rested at any switch, which is written.
         x: (n,) state at the start.
         atol: (n,) absolute tolerances.
         rtol: relative one.
@@ -346,17 +307,17 @@ def advance(system, watch, limits, x, atol, rtol, uneven, ends, lengths, states)
         How many steps were made, the length of the next one in s, how many were tried, and whether a guard may be met
         in the last one.
     """
-    (n, m), (t, end, step, longest, _) = (x.size, watch[1].size), limits
-    slopes, shapes, course = np.empty((STAGES + 1 + FURTHER, n)), np.empty((SHAPES, n)), np.empty((PARTS.size + 2, m))
+    n, m, t, end, step, longest = x.size, places.size, limits[0], limits[1], limits[2], limits[3]
+    slopes, shapes = np.empty((STAGES + 1 + FURTHER, n)), np.empty((SHAPES + 2, n))
     begin, y, new = np.empty(n), np.empty(n), np.empty(n)
     count, tried, shrunk, attempts, stop, near = 0, 0, False, 0, end, False
     _copy(x, begin)
     _rates(system, t, x, slopes[0])
     if m:
         _values(system, t, x, course[0])
-    if not step > 0:
-        step = _first_step(system, t, x, slopes[0], limits, atol, rtol, y, new)
     while count < ends.size and t < end and not near:
+        if not step > 0:
+            step = _first_step(system, t, begin, slopes[0], limits, atol, rtol, y, new)
         if not step > 10 * EPS * abs(t):
             break
         last = min(step, longest) >= stop - t
@@ -370,16 +331,18 @@ def advance(system, watch, limits, x, atol, rtol, uneven, ends, lengths, states)
             continue
         reached, switch = stop if last else t + length, np.inf
         _rates(system, reached, new, slopes[STAGES])
-        if m and _is_near(system, watch, t, begin, length, slopes, y, new, course):
-            looks = (system, watch, t, begin, length, shapes, y, course)
+        if m and _is_near(system, places, t, begin, length, slopes, y, new, course):
+            looks = (system, places, t, length, shapes, course)
             _shapes(system, t, begin, length, slopes, y, new, shapes)
-            _look(looks)
-            switch = _end_at_switch(looks, reached, limits, atol, rtol, uneven, slopes[STAGES + 1])
+            for row in range(1, PARTS.size - 1):
+                _watched(looks, PARTS[row], row)
+            part, met, near = _first_met(looks, atol, rtol, uneven)
+            if met >= 0:
+                switch = _end_at_switch(looks, part, met, reached, limits, atol, rtol, slopes[STAGES + 1])
             if switch < reached:  # after four attempts that do not converge, half of it
                 attempts += 1
-                stop = switch if attempts <= 4 else min(switch, t + length / 2)
+                stop, near = switch if attempts <= 4 else min(switch, t + length / 2), False
                 continue
-            near = _nears_guard(watch, course)
         factor = min(10.0, max(0.2, 0.9 * error**-0.125)) if error > 0 else 10.0
         step = length * (min(1.0, factor) if shrunk else factor)
         ends[count], lengths[count] = reached, length
@@ -388,8 +351,7 @@ def advance(system, watch, limits, x, atol, rtol, uneven, ends, lengths, states)
         _copy(slopes[STAGES], slopes[0])
         _copy(course[PARTS.size - 1], course[0])
         t, stop, shrunk, attempts, count = reached, end, False, 0, count + 1
-        if switch == reached:
-            step = _first_step(system, t, begin, slopes[0], limits, atol, rtol, y, new)
+        step = 0.0 if switch == reached else step
     return count, step, tried, near
 
 
@@ -408,19 +370,19 @@ def between(system, spans, starts, lengths, states, numbers, times, values):  # 
         values: (k, n) takes the states.
     """
     n, prepared = states.shape[1], -1
-    slopes, shapes = np.empty((STAGES + 1 + FURTHER, n)), np.empty((SHAPES, n))
+    slopes, shapes = np.empty((STAGES + 1 + FURTHER, n)), np.empty((SHAPES + 1, n))
     y, end = np.empty(n), np.empty(n)
     for k in range(times.size):
         number = numbers[k]
         t, length, x = starts[number], lengths[number], states[number]
         if number != prepared:
-            here = (system[0], system[1], system[2], spans[number])
+            here = (system[0], system[1], system[2], spans[number, 0], spans[number, 1], system[5])
             _rates(here, t, x, slopes[0])
             _all_stages(here, t, x, length, slopes, y, end)
             _rates(here, t + length, end, slopes[STAGES])
             _shapes(here, t, x, length, slopes, y, end, shapes)
             prepared = number
-        _inside(shapes, x, (times[k] - t) / length, values[k])
+        _inside(shapes, (times[k] - t) / length, values[k])
 
 
 @_compiled(types.void(types.int64, VECTOR, VECTOR, MATRIX, MATRIX))
