@@ -310,14 +310,14 @@ def advance(system, places, course, limits, x, atol, rtol, uneven, ends, lengths
     n, m, t, end, step, longest = x.size, places.size, limits[0], limits[1], limits[2], limits[3]
     slopes, shapes = np.empty((STAGES + 1 + FURTHER, n)), np.empty((SHAPES + 2, n))
     begin, y, new = np.empty(n), np.empty(n), np.empty(n)
-    count, tried, shrunk, attempts, stop, near = 0, 0, False, 0, end, False
+    count, tried, shrunk, attempts, whole, stop, near = 0, 0, False, 0, 0.0, end, False
     _copy(x, begin)
     _rates(system, t, x, slopes[0])
     if m:
         _values(system, t, x, course[0])
+    if not step > 0:
+        step = _first_step(system, t, x, slopes[0], limits, atol, rtol, y, new)
     while count < ends.size and t < end and not near:
-        if not step > 0:
-            step = _first_step(system, t, begin, slopes[0], limits, atol, rtol, y, new)
         if not step > 10 * EPS * abs(t):
             break
         last = min(step, longest) >= stop - t
@@ -340,18 +340,17 @@ def advance(system, places, course, limits, x, atol, rtol, uneven, ends, lengths
             if met >= 0:
                 switch = _end_at_switch(looks, part, met, reached, limits, atol, rtol, slopes[STAGES + 1])
             if switch < reached:  # after four attempts that do not converge, half of it
-                attempts += 1
+                attempts, whole = attempts + 1, max(whole, length)
                 stop, near = switch if attempts <= 4 else min(switch, t + length / 2), False
                 continue
         factor = min(10.0, max(0.2, 0.9 * error**-0.125)) if error > 0 else 10.0
-        step = length * (min(1.0, factor) if shrunk else factor)
+        step = max(whole, length * (min(1.0, factor) if shrunk else factor))
         ends[count], lengths[count] = reached, length
         _copy(new, states[count])
         _copy(new, begin)
         _copy(slopes[STAGES], slopes[0])
         _copy(course[PARTS.size - 1], course[0])
-        t, stop, shrunk, attempts, count = reached, end, False, 0, count + 1
-        step = 0.0 if switch == reached else step
+        t, stop, shrunk, attempts, whole, count = reached, end, False, 0, 0.0, count + 1
     return count, step, tried, near
 
 
