@@ -17,8 +17,8 @@ Dense = Callable[[Array], Array]
 # Where in a step the switches are looked at before `LOOKS`.
 FIRST = np.array([0.47])
 RESTING, LEFT = 50, 10.0
-"""A motion that passes the same switch so many times in a row within its tolerance rests there, until it leaves it by so
-many tolerances."""
+"""A motion that passes the same switch so many times in a row within its tolerance rests there, until it leaves it by
+so many tolerances."""
 
 
 def tolerance(problem: Problem | DaeProblem, x: Array) -> Array:

@@ -67,6 +67,7 @@ def jacobians_at(problem: Problem, times: Array, states: Array) -> list[Any]:
     if problem.jacobians is not None:
         matrices = problem.jacobians(times, states)
     else:
+        assert problem.jacobian is not None  # noqa: S101 (asked only then)
         matrices = [problem.jacobian(t, x) for t, x in zip(times.tolist(), states, strict=True)]
     return [full_where_small(matrix) for matrix in matrices]
 

@@ -41,7 +41,8 @@ def _compiled(signature: Any) -> Callable[[Any], Any]:
     return decorate
 
 
-_part = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, no_rewrites=True)
+_part = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, no_rewrites=True)  # type: ignore[call-overload]
+"""Compile a function that others here alone call, without what would let Python call it."""
 _PLACES = types.Array(types.int64, 1, "C")
 _SYSTEM = types.Tuple((types.int64, types.int64, types.int64, types.float64, types.float64, VECTOR))  # type: ignore[no-untyped-call]
 """Addresses of its rates and of what is watched, how many of that are guards, the earliest and the latest time in s at
@@ -91,7 +92,7 @@ def _all_stages(system, t, x, step, slopes, y, end):  # type: ignore[no-untyped-
 
 @_part
 def _shapes(system, t, x, step, slopes, y, end, shapes):  # type: ignore[no-untyped-def]
-    """Write what makes the dense output of a step from all its slopes, with that at the end; and behind it its start."""
+    """Write what makes the dense output of a step from all its slopes, with that at the end; behind it its start."""
     for stage in range(FURTHER):
         _stage(slopes, AFTER[stage], x, step, y)
         _rates(system, t + LATER[stage] * step, y, slopes[STAGES + 1 + stage])
@@ -131,6 +132,14 @@ def _error(slopes, x, new, step, atol, rtol):  # type: ignore[no-untyped-def]
         third += (b / scale) ** 2
     whole = fifth + 0.01 * third
     return step * fifth / math.sqrt(whole * x.size) if whole > 0 else whole
+
+
+@_part
+def _factor(error, most):  # type: ignore[no-untyped-def]
+    """How many times as long the next step may be."""
+    if error == 0:
+        return most
+    return min(most, max(0.2, 0.9 * error**-0.125)) if error < np.inf else 0.2
 
 
 @_part
@@ -232,6 +241,8 @@ def _first_met(looks, atol, rtol, uneven):  # type: ignore[no-untyped-def]
     """
     system, places, t, step, shapes, course = looks
     y, moved, rests = shapes[SHAPES + 1], course[PARTS.size + 1], course[PARTS.size + 4]
+    for row in range(1, PARTS.size - 1):
+        _watched(looks, PARTS[row], row)
     for i in range(y.size):
         y[i] = shapes[SHAPES, i] + uneven[i] * (atol[i] + rtol * abs(shapes[SHAPES, i]))
     _values(system, t, y, moved)
@@ -261,7 +272,12 @@ def _first_met(looks, atol, rtol, uneven):  # type: ignore[no-untyped-def]
 
 @_part
 def _end_at_switch(looks, part, c, end, limits, atol, rtol, rate):  # type: ignore[no-untyped-def]
-    """The time in s at which a step has to end for a switch that leaves its side, as `Crossings.cut` tells."""
+    """The time in s at which a step has to end for a switch that leaves its side, if there is one; else infinite.
+
+    It is that of `Crossings.cut`.
+    """
+    if c < 0:
+        return np.inf
     system, _, t, step, shapes, course = looks
     y, rests = shapes[SHAPES + 1], course[PARTS.size + 4]
     time, longest, value = t + part * step, np.inf, course[0, c]
@@ -296,12 +312,8 @@ def advance(system, places, course, limits, x, atol, rtol, uneven, ends, lengths
         limits: time at the start, end, first step or zero, longest step and clearance, s; and how often in a row the
             motion has rested at any switch, which is written.
         x: (n,) state at the start.
-        atol: (n,) absolute tolerances.
-        rtol: relative one.
-        uneven: (n,) parts of the tolerance by which states are moved.
-        ends: (k,) takes the times at the ends of the steps, s.
-        lengths: (k,) takes their lengths, s.
-        states: (k, n) takes the states there.
+        atol, rtol, uneven: (n,) absolute tolerances, the relative one, and (n,) parts by which they move states.
+        ends, lengths, states: (k,), (k,) and (k, n) take the ends of the steps and their lengths in s, and the states.
 
     Returns:
         How many steps were made, the length of the next one in s, how many were tried, and whether a guard may be met
@@ -309,9 +321,8 @@ def advance(system, places, course, limits, x, atol, rtol, uneven, ends, lengths
     """
     n, m, t, end, step, longest = x.size, places.size, limits[0], limits[1], limits[2], limits[3]
     slopes, shapes = np.empty((STAGES + 1 + FURTHER, n)), np.empty((SHAPES + 2, n))
-    begin, y, new = np.empty(n), np.empty(n), np.empty(n)
+    y, new = np.empty(n), np.empty(n)
     count, tried, shrunk, attempts, whole, stop, near = 0, 0, False, 0, 0.0, end, False
-    _copy(x, begin)
     _rates(system, t, x, slopes[0])
     if m:
         _values(system, t, x, course[0])
@@ -322,35 +333,29 @@ def advance(system, places, course, limits, x, atol, rtol, uneven, ends, lengths
             break
         last = min(step, longest) >= stop - t
         length = stop - t if last else min(step, longest)
-        _all_stages(system, t, begin, length, slopes, y, new)
+        _all_stages(system, t, x, length, slopes, y, new)
         tried += 1
-        error = _error(slopes, begin, new, length, atol, rtol)
-        if not error < 1:
-            step = length * (max(0.2, 0.9 * error**-0.125) if error >= 1 and error < np.inf else 0.2)
-            shrunk = True
+        error = _error(slopes, x, new, length, atol, rtol)
+        step = length * _factor(error, 10.0 if error < 1 and not shrunk else 1.0)
+        shrunk = not error < 1
+        if shrunk:
             continue
-        reached, switch = stop if last else t + length, np.inf
+        reached = stop if last else t + length
         _rates(system, reached, new, slopes[STAGES])
-        if m and _is_near(system, places, t, begin, length, slopes, y, new, course):
+        if m and _is_near(system, places, t, x, length, slopes, y, new, course):
             looks = (system, places, t, length, shapes, course)
-            _shapes(system, t, begin, length, slopes, y, new, shapes)
-            for row in range(1, PARTS.size - 1):
-                _watched(looks, PARTS[row], row)
+            _shapes(system, t, x, length, slopes, y, new, shapes)
             part, met, near = _first_met(looks, atol, rtol, uneven)
-            if met >= 0:
-                switch = _end_at_switch(looks, part, met, reached, limits, atol, rtol, slopes[STAGES + 1])
+            switch = _end_at_switch(looks, part, met, reached, limits, atol, rtol, slopes[STAGES + 1])
             if switch < reached:  # after four attempts that do not converge, half of it
-                attempts, whole = attempts + 1, max(whole, length)
-                stop, near = switch if attempts <= 4 else min(switch, t + length / 2), False
+                attempts, whole, near = attempts + 1, max(whole, length), False
+                stop = switch if attempts <= 4 else min(switch, t + length / 2)
                 continue
-        factor = min(10.0, max(0.2, 0.9 * error**-0.125)) if error > 0 else 10.0
-        step = max(whole, length * (min(1.0, factor) if shrunk else factor))
-        ends[count], lengths[count] = reached, length
-        _copy(new, states[count])
-        _copy(new, begin)
+        ends[count], lengths[count], x = reached, length, states[count]
+        _copy(new, x)
         _copy(slopes[STAGES], slopes[0])
         _copy(course[PARTS.size - 1], course[0])
-        t, stop, shrunk, attempts, whole, count = reached, end, False, 0, 0.0, count + 1
+        t, stop, step, attempts, whole, count = reached, end, max(whole, step), 0, 0.0, count + 1
     return count, step, tried, near
 
 
@@ -386,14 +391,6 @@ def between(system, spans, starts, lengths, states, numbers, times, values):  # 
 
 @_compiled(types.void(types.int64, VECTOR, VECTOR, MATRIX, MATRIX))
 def values_at(code, p, times, states, values):  # type: ignore[no-untyped-def]
-    """Write rates or what is watched, at times and states.
-
-    Args:
-        code: its address.
-        p: parameters.
-        times: (k,) s.
-        states: (k, n) then.
-        values: (k, m) takes it.
-    """
+    """Write rates or what is watched (k, m), by the address of its code, at times (k,) in s and states (k, n)."""
     for k in range(times.size):
         call_at(code, times[k], states[k], p, values[k])

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import sparse
 
 from shaftwork.integrate.linear.linear_system import OWN_INTERVALS
 from shaftwork.integrate.problem import Array, Observed, Problem, Trajectory
