@@ -226,8 +226,8 @@ class _MachineStepper:
         problem, x = self._problem, np.ascontiguousarray(x)
         room = max(1, min(MOST_AHEAD, problem.max_steps - self._steps))
         ends, lengths, states = np.empty(room), np.empty(room), np.empty((room, x.size))
-        limits = np.array([t, self._end, self.length, self._limit, self._clearance, self._rested])
-        count, self.length, tried, near = advance(
+        limits = np.array([t, self._end, self.length, self._limit, self._clearance, self._rested, 0.0])
+        count, self.length, tried, guard, unclear = advance(
             _system(self._machine, self._piece.low, self._piece.high), self._places, self._course, limits,
             x, problem.atol, problem.rtol, self._uneven, ends, lengths, states,
         )  # fmt: skip
@@ -242,7 +242,9 @@ class _MachineStepper:
         before, last = (ends[:-1], states[:-1]) if count > 1 else None, count - 1
         dense = _MachineDense(self._machine, starts[last:], _Taken(*(values[last:] for values in self._made)))
         self._rested = limits[5]
-        return Step(ends[last], states[last], dense, before, clear=not near, rests=self._rested >= RESTING)
+        met = (float(starts[last] + limits[6] * lengths[last]), guard) if guard >= 0 and not unclear else None
+        clear, rests = guard < 0 and not unclear, self._rested >= RESTING
+        return Step(ends[last], states[last], dense, before, clear=clear, met=met, rests=rests)
 
     def again(self, t: float, x: Array, end: float, longest: float) -> None:  # noqa: ARG002 (it starts as it did)
         self._taken.append(_Taken(*(values[:-1] for values in self._made)))

@@ -234,8 +234,8 @@ def _leaves(looks, c, band):  # type: ignore[no-untyped-def]
 
 @_part
 def _first_met(looks, atol, rtol, uneven):  # type: ignore[no-untyped-def]
-    """The part of a step at which a switch leaves its side first, by bisection, and this switch, or -1; and whether a
-    guard is beyond its limit, or has no value, anywhere in the step.
+    """The part of a step at which a switch leaves its side first and this switch, the same of a guard, or -1 for none;
+    and whether a guard is beyond its limit from the start, or has no value anywhere.
 
     A switch at which the motion rests is not looked at.
     """
@@ -246,28 +246,28 @@ def _first_met(looks, atol, rtol, uneven):  # type: ignore[no-untyped-def]
     for i in range(y.size):
         y[i] = shapes[SHAPES, i] + uneven[i] * (atol[i] + rtol * abs(shapes[SHAPES, i]))
     _values(system, t, y, moved)
-    first, met, near = 2.0, -1, False
+    first, met, part, guard, unclear = 2.0, -1, 2.0, -1, False
     for c in places:
-        band, guard = abs(moved[c] - course[0, c]), c < system[2]
-        if guard:
-            band = 0.0
+        is_guard, band = c < system[2], abs(moved[c] - course[0, c])
+        if is_guard:
+            band, unknown = 0.0, 0.0
             for row in range(PARTS.size):
-                near |= not _height(course, row, c) > 0
+                unknown += 0 * _height(course, row, c)
+            unclear |= not _height(course, 0, c) > unknown
         elif abs(course[0, c]) > LEFT * band:
             rests[c] = 0
         low, high = _leaves(looks, c, band) if rests[c] < RESTING else (-1.0, -1.0)
-        if guard:
-            near |= high >= 0
-            continue
         if course[PARTS.size + 2, c] == 0:
             low, high = 0.0, min(high, 0.0)  # it leaves zero at once
         while high - low > EPS * max(abs(t), abs(t + step)) / step:
             middle = (low + high) / 2
             _watched(looks, middle, PARTS.size)
             low, high = (middle, high) if _height(course, PARTS.size, c) >= 0 else (low, middle)
-        if high >= 0 and low < first:
+        if is_guard and 0 <= high < part:
+            part, guard = high, c
+        elif not is_guard and high >= 0 and low < first:
             first, met = low, c
-    return first, met, near
+    return first, met, part, guard, unclear
 
 
 @_part
@@ -296,12 +296,12 @@ def _end_at_switch(looks, part, c, end, limits, atol, rtol, rate):  # type: igno
 
 
 @_compiled(
-    types.Tuple((types.int64, types.float64, types.int64, types.boolean))(  # type: ignore[no-untyped-call]
+    types.Tuple((types.int64, types.float64, types.int64, types.int64, types.boolean))(  # type: ignore[no-untyped-call]
         _SYSTEM, _PLACES, MATRIX, VECTOR, VECTOR, VECTOR, types.float64, VECTOR, VECTOR, VECTOR, MATRIX
     )
 )
 def advance(system, places, course, limits, x, atol, rtol, uneven, ends, lengths, states):  # type: ignore[no-untyped-def]
-    """Make steps until there is no room for more, the end is reached, a guard comes near or one becomes too small.
+    """Make steps until there is no room for more, the end is reached, a guard is met or one becomes too small.
 
     Each of them ends just past the first switch that it meets.
 
@@ -309,26 +309,26 @@ def advance(system, places, course, limits, x, atol, rtol, uneven, ends, lengths
         system: see `_SYSTEM`.
         places: of the guards and switches that are watched, in all of them.
         course: see `COURSE`; (COURSE, 0) where nothing is.
-        limits: time at the start, end, first step or zero, longest step and clearance, s; and how often in a row the
-            motion has rested at any switch, which is written.
+        limits: time at the start, end, first step or zero, longest step and clearance, s. Two that are written: how
+            often in a row the motion has rested at any switch, and the part of the last step at which the guard is met.
         x: (n,) state at the start.
         atol, rtol, uneven: (n,) absolute tolerances, the relative one, and (n,) parts by which they move states.
         ends, lengths, states: (k,), (k,) and (k, n) take the ends of the steps and their lengths in s, and the states.
 
     Returns:
-        How many steps were made, the length of the next one in s, how many were tried, and whether a guard may be met
-        in the last one.
+        How many steps were made, the length of the next one in s, how many were tried, the guard that is met in the
+        last one, or -1, and whether its guards need a closer look.
     """
     n, m, t, end, step, longest = x.size, places.size, limits[0], limits[1], limits[2], limits[3]
     slopes, shapes = np.empty((STAGES + 1 + FURTHER, n)), np.empty((SHAPES + 2, n))
     y, new = np.empty(n), np.empty(n)
-    count, tried, shrunk, attempts, whole, stop, near = 0, 0, False, 0, 0.0, end, False
+    count, tried, shrunk, attempts, whole, stop, guard, unclear = 0, 0, False, 0, 0.0, end, -1, False
     _rates(system, t, x, slopes[0])
     if m:
         _values(system, t, x, course[0])
     if not step > 0:
         step = _first_step(system, t, x, slopes[0], limits, atol, rtol, y, new)
-    while count < ends.size and t < end and not near:
+    while count < ends.size and t < end and guard < 0 and not unclear:
         if not step > 10 * EPS * abs(t):
             break
         last = min(step, longest) >= stop - t
@@ -345,10 +345,10 @@ def advance(system, places, course, limits, x, atol, rtol, uneven, ends, lengths
         if m and _is_near(system, places, t, x, length, slopes, y, new, course):
             looks = (system, places, t, length, shapes, course)
             _shapes(system, t, x, length, slopes, y, new, shapes)
-            part, met, near = _first_met(looks, atol, rtol, uneven)
+            part, met, limits[6], guard, unclear = _first_met(looks, atol, rtol, uneven)
             switch = _end_at_switch(looks, part, met, reached, limits, atol, rtol, slopes[STAGES + 1])
             if switch < reached:  # after four attempts that do not converge, half of it
-                attempts, whole, near = attempts + 1, max(whole, length), False
+                attempts, whole, guard, unclear = attempts + 1, max(whole, length), -1, False
                 stop = switch if attempts <= 4 else min(switch, t + length / 2)
                 continue
         ends[count], lengths[count], x = reached, length, states[count]
@@ -356,7 +356,7 @@ def advance(system, places, course, limits, x, atol, rtol, uneven, ends, lengths
         _copy(slopes[STAGES], slopes[0])
         _copy(course[PARTS.size - 1], course[0])
         t, stop, step, attempts, whole, count = reached, end, max(whole, step), 0, 0.0, count + 1
-    return count, step, tried, near
+    return count, step, tried, guard, unclear
 
 
 @_compiled(types.void(_SYSTEM, MATRIX, VECTOR, VECTOR, MATRIX, _PLACES, VECTOR, MATRIX))
