@@ -221,8 +221,6 @@ class _MachineStepper:
         self._end, self._limit, self.length = end, at.longest, at.length
 
     def step(self, t: float, x: Array) -> Step:
-        if t >= self._end:  # up to a switch
-            self._end, self._limit = self._piece.end, self._longest
         problem, x = self._problem, np.ascontiguousarray(x)
         room = max(1, min(MOST_AHEAD, problem.max_steps - self._steps))
         ends, lengths, states = np.empty(room), np.empty(room), np.empty((room, x.size))
@@ -234,7 +232,7 @@ class _MachineStepper:
         self.tried += tried
         if not count:
             raise self._failure(t, x)
-        ends, states = ends[:count], states[:count]
+        ends, states = ends[:count].copy(), states[:count].copy()
         self._steps += count
         starts, begun = np.append(t, ends[: count - 1]), np.vstack([x, states[: count - 1]])
         spans = np.full((count, 2), (self._piece.low, self._piece.high))
