@@ -114,3 +114,12 @@ def test_without_heyoka_auto_takes_it(monkeypatch: pytest.MonkeyPatch) -> None:
     run = sw.scenes.crane().simulate(10.0)
     assert run.engine == "numba"
     assert "heyoka is not installed" in run.why
+
+
+@pytest.mark.parametrize("scene", ["crane", "excavator"])
+def test_jacobians_of_many_states_are_those_of_each(scene: str) -> None:
+    model, random = getattr(sw.scenes, scene)().compile(), np.random.default_rng(1)
+    bound, times, states = model.bind(), random.uniform(0.0, 5.0, 5), random.normal(0.0, 50.0, (5, len(model.states)))
+    for many, time, x in zip(bound.jacobians(times, states), times.tolist(), states, strict=True):
+        one = bound.jacobian(time, x).toarray()
+        np.testing.assert_allclose(many, one, atol=1e-12 * np.abs(one).max())  # sums in another order

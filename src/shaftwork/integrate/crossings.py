@@ -16,14 +16,20 @@ Dense = Callable[[Array], Array]
 
 # Where in a step the switches are looked at before `LOOKS`.
 FIRST = np.array([0.47])
+RESTING, LEFT = 50, 10.0
+"""A motion that passes the same switch so many times in a row within its tolerance rests there, until it leaves it by
+so many tolerances."""
 
 
 def tolerance(problem: Problem | DaeProblem, x: Array) -> Array:
     """How far the tolerance moves states (..., n): to both sides, and not alike."""
-    places = np.arange(x.shape[-1]) * np.sqrt(2.0) % 1.0
-    # of different sizes, lest the tolerances of two ends cancel in the twist between them
-    signed = (0.5 + places) * np.where(places * 16 % 2 < 1, 1.0, -1.0)
-    return np.asarray((problem.atol + problem.rtol * np.abs(x)) * signed)
+    return np.asarray((problem.atol + problem.rtol * np.abs(x)) * uneven(x.shape[-1]))
+
+
+def uneven(size: int) -> Array:
+    """(n,) parts of a tolerance, of different sizes and signs, lest those of two ends cancel in the twist between."""
+    places = np.arange(size) * np.sqrt(2.0) % 1.0
+    return np.asarray((0.5 + places) * np.where(places * 16 % 2 < 1, 1.0, -1.0))
 
 
 class Crossings:
@@ -35,14 +41,10 @@ class Crossings:
     Args:
         problem: what is being solved.
         piece: the piece.
-        resting: a motion that passes the same switch so many times in a row within its tolerance rests there,
-        left: until it leaves it by so many tolerances.
     """
 
-    def __init__(
-        self, problem: Problem | DaeProblem, piece: SmoothInterval, *, resting: int = 50, left: float = 10.0
-    ) -> None:
-        self._problem, self._piece, self._resting, self._left = problem, piece, resting, left
+    def __init__(self, problem: Problem | DaeProblem, piece: SmoothInterval) -> None:
+        self._problem, self._piece = problem, piece
         self._clearance = CLEARANCE * float(np.spacing(max(abs(problem.t0), abs(problem.t_end))))
         self._start, self._attempts = np.nan, 0
         self._rests, self._within = np.zeros(0, dtype=np.intp), 0
@@ -50,7 +52,7 @@ class Crossings:
     @property
     def rests(self) -> bool:
         """Whether the motion has passed switches again and again, and never left one by some tolerances."""
-        return self._within >= self._resting
+        return self._within >= RESTING
 
     def cut(self, start: float, x: Array, end: float, y: Array, dense: Dense, *, again: bool = True) -> float | None:
         """The time in s at which a step has to end and the method has to start anew, or None where it meets no switch.
@@ -90,7 +92,7 @@ class Crossings:
             # what breaks away begins without acceleration: for many such steps rounding keeps it where it starts
             self._rests[column] += look.values[0, column] == 0
             return self._settled(start, end, target)
-        near = abs(look.values[0, column]) <= self._left * band[column]
+        near = abs(look.values[0, column]) <= LEFT * band[column]
         self._rests[column], self._within = (self._rests[column] + 1, self._within + 1) if near else (0, 0)
         return target
 
@@ -124,8 +126,8 @@ class Crossings:
         """The switches (m,) at which the motion does not rest; step control alone sees the others."""
         if not self._rests.size:
             self._rests = np.zeros(values.size, dtype=np.intp)
-        self._rests[np.abs(values) > self._left * band] = 0
-        return self._rests < self._resting
+        self._rests[np.abs(values) > LEFT * band] = 0
+        return self._rests < RESTING
 
 
 class Look:
@@ -206,13 +208,8 @@ class Look:
         before = int(np.flatnonzero(self.values[:row, column] * side >= 0)[-1])
         low, high = float(self.times[before]), float(self.times[row])
         tolerance = max(near, float(np.spacing(self.times[-1])))
-        ends = {low: self.values[[before], column], high: self.values[[row], column]}
-
-        def value(times: Array) -> Array:
-            t = float(times[0])
-            return ends[t] if t in ends else self.at(times)[:, column]
-
-        return zero(value, low, high, xtol=tolerance)
+        ends = self.values[[before, row], column].tolist()
+        return zero(lambda times: self.at(times)[:, column], low, high, ends=ends, xtol=tolerance)
 
 
 def vertices(times: Array, heights: Array) -> tuple[Array, NDArray[np.bool_]]:

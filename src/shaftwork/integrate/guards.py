@@ -36,7 +36,9 @@ class GuardWatch:
         self._problem = problem
         self.met: int | None = None
 
-    def cut(self, start: float, x: Array, end: float, y: Array, dense: Dense) -> float | None:
+    def cut(
+        self, start: float, x: Array, end: float, y: Array, dense: Dense, *, met: tuple[float, int] | None = None
+    ) -> float | None:
         """The time in s at which a step meets its first guard, or None.
 
         Args:
@@ -45,12 +47,21 @@ class GuardWatch:
             end: of the step, s.
             y: (n,) state there.
             dense: its dense output, times (k,) to states (k, n).
+            met: the time in s and the guard, where they are known.
 
         Raises:
             SimulationError: a guard has no value there.
         """
         if not self._columns.size:
             return None
+        event = met or self._first_event(start, x, end, y, dense)
+        if event is None:
+            return None
+        time, self.met = event
+        return min(max(time, start + CLEARANCE * float(np.spacing(abs(end)))), end)
+
+    def _first_event(self, start: float, x: Array, end: float, y: Array, dense: Dense) -> tuple[float, int] | None:
+        """The time in s at which a step meets its first guard, and this guard; see `cut`."""
         first = start + FIRST * (end - start)
         times, states = np.array([start, *first, end]), np.vstack([x, dense(first), y])
         look = Look(self._values, times, states, dense, -np.ones(self._columns.size))
@@ -64,10 +75,7 @@ class GuardWatch:
         risen = np.flatnonzero((look.values > 0).any(axis=0)).tolist()
         rises = [(self._time(look, column, 2 * float(noise[column])), column) for column in risen]
         events = [(time, int(self._columns[column])) for time, column in rises if time is not None]
-        if not events:
-            return None
-        time, self.met = min(events)
-        return min(max(time, start + CLEARANCE * float(np.spacing(abs(end)))), end)
+        return min(events, default=None)
 
     def beyond(self, t: float, x: Array) -> int | None:
         """The guard that is farthest beyond its limit at a time in s with the state (n,); None where none is."""
@@ -157,8 +165,8 @@ class GuardWatch:
 
 def _zero(value: Callable[[Array], Array], low: float, high: float, ulp: float) -> float:
     """Where a function passes through zero; its end where it does not, as that is rounding away from others."""
-    first, last = value(np.array([low])), value(np.array([high]))
-    return high if first[0] * last[0] > 0 else zero(value, low, high, xtol=ulp)
+    first, last = ends = value(np.array([low, high])).tolist()
+    return high if first * last > 0 else zero(value, low, high, ends=ends, xtol=ulp)
 
 
 def share_of_tolerance(problem: Problem | DaeProblem, times: Array, states: Array) -> float:

@@ -242,6 +242,7 @@ class Problem(TimedProblem):
     Args:
         rhs: right-hand side, (time, (n,)) to a new (n,) array.
         jacobian: d rhs / d x as a scipy.sparse.csc_array (n, n), or None.
+        jacobians: the same from times (k,) and states (k, n), full arrays or sparse, or None.
         switches: what makes the right-hand side jump or bend where its sign changes with the motion, from times (k,)
             and states (k, n) to (k, m), or None where nothing does. An engine ends a step at such a change
             (`Crossings`), or finds it by its own means.
@@ -260,6 +261,7 @@ class Problem(TimedProblem):
 
     rhs: Callable[[float, Array], Array]
     jacobian: Callable[[float, Array], Any] | None
+    jacobians: Callable[[Array, Array], list[Any]] | None = None
     switches: Callable[[Array, Array], Array] | None = None
     past_guards: PastGuards | None = None
     linear: LinearInputs | None = None

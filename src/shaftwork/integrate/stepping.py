@@ -32,6 +32,8 @@ class Step(NamedTuple):
         dense: times (k,) inside the step to states (k, n), until the next step is made.
         before: steps that were made first, in which nothing is met: their ends (k,) in s and the states (k, n) there.
         clear: whether nothing is met in this one either.
+        met: the time in s at which it meets its first guard, and this guard, where the method knows.
+        rests: whether the motion rests at a switch, where the method passes switches by itself.
     """
 
     end: float
@@ -39,6 +41,8 @@ class Step(NamedTuple):
     dense: Dense
     before: tuple[Array, Array] | None = None
     clear: bool = False
+    met: tuple[float, int] | None = None
+    rests: bool = False
 
 
 class Stepper(Protocol):
@@ -175,7 +179,7 @@ def march(problem: Problem | DaeProblem, stepper: Stepper) -> SteppedRun:
                 t, x = done[-1].extended(*step.before)
                 pace.passed(step.before[0].size)
             looks = t, x, step.end, step.state, step.dense
-            guard = None if step.clear else watch.cut(*looks)
+            guard = None if step.clear else watch.cut(*looks, met=step.met)
             switch = None if step.clear else crossings.cut(*looks, again=not stepper.cuts_off)
             if guard is not None and (switch is None or guard <= switch):
                 if step.end - t > shortest and not watch.follows(t, x, guard, step.dense):
@@ -189,7 +193,7 @@ def march(problem: Problem | DaeProblem, stepper: Stepper) -> SteppedRun:
                     continue
             state = step.state if end == step.end else step.dense(np.array([end]))[0]
             stepper.take(t, end, state)
-            if (objection := pace.objection(end, rests=crossings.rests)) is not None:
+            if (objection := pace.objection(end, rests=crossings.rests or step.rests)) is not None:
                 raise failure(problem, stepper.engine, end, state, objection)
             done[-1].times.append(end)
             done[-1].states.append(state)

@@ -45,8 +45,8 @@ def bound_of_decay(matrices: Iterable[Any]) -> float:
 
 
 def jacobians(problem: Problem) -> Iterator[Any]:
-    """Those at the start of a problem and at a few states that it may soon reach."""
-    return (matrix for matrix in _jacobians(problem) if np.isfinite(matrix.data).all())
+    """Those at the start of a problem and at a few states that it may soon reach; small ones as full arrays."""
+    return (matrix for matrix in _jacobians(problem) if np.isfinite(abs(matrix).sum()))
 
 
 def _jacobians(problem: Problem) -> Iterator[Any]:
@@ -54,12 +54,28 @@ def _jacobians(problem: Problem) -> Iterator[Any]:
         return
     for piece in pieces(problem)[:4]:  # not all of them: every piece of a pulsed input looks alike
         time = piece.inside(piece.start)
-        matrix = sparse.csc_array(problem.jacobian(time, problem.x0))
+        (matrix,) = jacobians_at(problem, np.array([time]), problem.x0[None])
         yield matrix
         # One linearly implicit Euler step is stable however stiff the system is, and leads to where it goes.
         moved = _implicit_step(problem, time, matrix, 0.1 * (piece.end - piece.start))
         if moved is not None:
-            yield sparse.csc_array(problem.jacobian(time, moved))
+            yield from jacobians_at(problem, np.array([time]), moved[None])
+
+
+def jacobians_at(problem: Problem, times: Array, states: Array) -> list[Any]:
+    """Those at times (k,) and states (k, n): small ones as full arrays."""
+    if problem.jacobians is not None:
+        matrices = problem.jacobians(times, states)
+    else:
+        assert problem.jacobian is not None  # noqa: S101 (asked only then)
+        matrices = [problem.jacobian(t, x) for t, x in zip(times.tolist(), states, strict=True)]
+    return [full_where_small(matrix) for matrix in matrices]
+
+
+def full_where_small(matrix: Any) -> Any:
+    """A small matrix as a full array, which is by far the faster; a large one as it is."""
+    small = sparse.issparse(matrix) and matrix.shape[0] <= LARGEST_EIGENVALUES
+    return matrix.toarray() if small else matrix
 
 
 def first_jacobian(problem: Problem) -> Any:
@@ -89,18 +105,20 @@ def is_undamped(problem: Problem) -> bool:
 
 
 def _implicit_step(problem: Problem, time: float, matrix: Any, step: float) -> Array | None:
-    derivative = problem.rhs(time, problem.x0)
+    change, size = step * problem.rhs(time, problem.x0), problem.x0.size
     try:
-        factors = splu(sparse.csc_matrix(sparse.eye_array(problem.x0.size) - step * matrix))
-    except RuntimeError:  # exactly singular: a growing motion has just this rate
+        if isinstance(matrix, np.ndarray):
+            moved = problem.x0 + np.linalg.solve(np.eye(size) - step * matrix, change)
+        else:
+            moved = problem.x0 + splu(sparse.csc_matrix(sparse.eye_array(size) - step * matrix)).solve(change)
+    except (RuntimeError, np.linalg.LinAlgError):  # exactly singular: a growing motion has just this rate
         return None
-    moved = problem.x0 + np.asarray(factors.solve(step * derivative))
     return moved if np.isfinite(moved).all() else None
 
 
 def _rates_of(matrix: Any) -> Rates:
     if matrix.shape[0] <= LARGEST_EIGENVALUES:
-        values = np.linalg.eigvals(matrix.toarray())
+        values = np.linalg.eigvals(matrix)
         damped = np.abs(values.real) > np.abs(values.imag)
         decay = np.max(-values.real, initial=0.0, where=damped)
         return Rates(float(decay), float(np.max(np.abs(values.imag), initial=0.0, where=~damped)))
@@ -109,7 +127,6 @@ def _rates_of(matrix: Any) -> Rates:
 
 def _bounds_of(matrix: Any) -> Rates:
     """Bounds of the rates, by the symmetric and the other part of the balanced matrix."""
-    matrix = matrix.toarray() if matrix.shape[0] <= LARGEST_EIGENVALUES else matrix  # small full ones are faster
     scaled = scale_by(matrix, balance(matrix))
     return Rates(norm((scaled + scaled.T) / 2), norm((scaled - scaled.T) / 2))
 
@@ -120,13 +137,11 @@ def balance(matrix: Any, sweeps: int = 8) -> Array:
     Source: Osborne, On pre-conditioning of matrices, 1960. Powers of two, so the scaling itself does not round.
     """
     size = abs(matrix if isinstance(matrix, np.ndarray) else sparse.csr_array(matrix))
-    scale = np.ones(matrix.shape[0])
+    scale, both = np.ones(matrix.shape[0]), np.flatnonzero((size.sum(axis=1) > 0) & (size.sum(axis=0) > 0))
+    rows, columns = size[both], size[:, both].T
     for _ in range(sweeps):
-        rows = (size @ scale) / scale
-        columns = (size.T @ (1 / scale)) * scale
-        both = (rows > 0) & (columns > 0)
         # Half of the full correction: all entries move at once, and the full one would overshoot.
-        scale[both] *= (rows[both] / columns[both]) ** 0.25
+        scale[both] = (scale[both] ** 2 * (rows @ scale) / (columns @ (1 / scale))) ** 0.25
     return np.asarray(2.0 ** np.round(np.log2(scale)))
 
 

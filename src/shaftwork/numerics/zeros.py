@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,13 +18,21 @@ Chosen = slice | NDArray[np.bool_]
 """Some of many functions."""
 
 
-def zero(function: Callable[[Array], Array], low: float, high: float, *, xtol: float | None = None) -> float:
+def zero(
+    function: Callable[[Array], Array],
+    low: float,
+    high: float,
+    *,
+    ends: Sequence[float] = (),
+    xtol: float | None = None,
+) -> float:
     """A zero between two places at which a function has different signs.
 
     Args:
         function: from places (1,) to values (1,).
         low: one place.
         high: the other.
+        ends: the values there, where they are known.
         xtol: how exactly the zero is wanted; by default to four roundings of itself.
 
     Raises:
@@ -32,8 +40,10 @@ def zero(function: Callable[[Array], Array], low: float, high: float, *, xtol: f
     """
     from scipy.optimize import brentq
 
+    values = dict(zip((low, high), ends, strict=False))
+
     def value(place: float) -> float:
-        return float(function(np.array([place]))[0])
+        return values[place] if place in values else float(function(np.array([place]))[0])
 
     if xtol is None:
         return float(brentq(value, low, high, xtol=np.finfo(float).tiny, rtol=4 * EPS))

@@ -160,6 +160,7 @@ class Prepared:
         return Problem(
             rhs=self.rhs,
             jacobian=self.jacobian,
+            jacobians=lambda t, x: self.bound.jacobians(t, x),  # noqa: PLW0108 (which makes the matrices)
             x0=x0,
             t0=span[0],
             t_end=span[1],

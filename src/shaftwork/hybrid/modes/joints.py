@@ -255,6 +255,10 @@ class HeldArrays(BoundArrays):
         """d rhs / d x as scipy.sparse.csc_array (n, n)."""
         return self._moving.jacobian(t, x)
 
+    def jacobians(self, times: Array, states: Array) -> list[Any]:
+        """The same at times (k,) and states (k, n)."""
+        return self._moving.jacobians(times, states)
+
 
 class HeldStores(StateTransfer):
     """What is stored where inertias are held together, and each is a state all the same."""

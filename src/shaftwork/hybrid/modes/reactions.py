@@ -114,7 +114,8 @@ class ReactionEquations(ModeEquations):
 
     def judged(self, p: Array, problem: Problem) -> Problem:
         """The motion by which an engine is chosen: with nothing held, as stiffness may be hidden in what is."""
-        return replace(problem, jacobian=self.slopes(partial(self.prepared(p).bound.with_laws, p)))
+        slopes = self.slopes(partial(self.prepared(p).bound.with_laws, p))
+        return replace(problem, jacobian=slopes, jacobians=None)
 
     def _reading(self, bound: HeldArrays, matrices: ReadingMatrices) -> Callable[[Array, Array], Array]:
         """What guards are made of; rounding gives no speed to what holds."""

@@ -1,30 +1,29 @@
 """The engine in machine code for any platform: Dormand and Prince's method of order 8(5,3), compiled by numba.
 
-It makes many steps in one call and looks at all their guards and switches at once afterwards: those behind the first
-that meets one are thrown away. Between the ends of its steps it makes them again where somebody asks.
+It makes many steps in one call, past the switches of laws, up to the first that may meet a guard. Between the ends of
+its steps it makes them again where somebody asks.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from shaftwork.core.errors import ParameterError, SimulationError
-from shaftwork.integrate.crossings import FIRST, vertices
-from shaftwork.integrate.explicit.dormand_prince_loops import advance, between, watch
+from shaftwork.integrate.crossings import RESTING, uneven
+from shaftwork.integrate.explicit.dormand_prince_loops import COURSE, advance, between, values_at
 from shaftwork.integrate.explicit.explicit_runs import MarchedRun, solid
 from shaftwork.integrate.problem import Array, MachineRates, Problem, Trajectory, changed
 from shaftwork.integrate.smooth_intervals import GuardedFunctions, SmoothInterval, failure, pieces
 from shaftwork.integrate.stepping import Step, march, with_outputs
 from shaftwork.integrate.stiffness import bound_of_decay, jacobians
-from shaftwork.numerics.zeros import LOOKS
+from shaftwork.numerics.tolerances import CLEARANCE
 
-# Where in a step that is not far from a switch the others look.
-LATER = np.sort(np.append(FIRST, LOOKS))
-# Steps in one call: the most, where nothing can be met in them; and at first, doubled while they meet nothing.
-MOST_AHEAD, FIRST_AHEAD = 4096, 8
+MOST_AHEAD = 512
+"""Steps in one call."""
 MOST_SMOOTH = 256
 """Steps in one from outside: where more are needed the motion is stiff."""
 
@@ -47,7 +46,7 @@ def solve(problem: Problem) -> Trajectory:
 
     def run(problem: Problem, longest: float) -> MarchedRun:
         stepper = _MachineStepper(problem, machine, longest)
-        whole = march(problem, stepper)
+        whole = march(changed(problem, switches=None), stepper)
         counts = {"rejected": stepper.tried - (whole.steps.size - 1)}
         return MarchedRun(whole, stepper.dense(whole.steps), counts)
 
@@ -57,28 +56,36 @@ def solve(problem: Problem) -> Trajectory:
 
 
 def _watching(problem: Problem, machine: MachineRates) -> Problem:
-    """The same problem, with guards and switches in machine code."""
+    """The same problem, with guards and rates of many states in machine code."""
+    if problem.guards is None:
+        return problem
 
-    def values(times: Array, states: Array) -> Array:
-        watched = np.empty((times.size, machine.guards + machine.switches))
-        watch(machine.watched.address, machine.p, times, np.ascontiguousarray(states), watched)
-        return watched
+    def of_many(code: Any, count: int, times: Array, states: Array) -> Array:
+        values = np.empty((times.size, count))
+        values_at(code.address, machine.p, times, np.ascontiguousarray(states), values)
+        return values
 
-    guards, switches = problem.guards, None
-    if guards is not None:
-        guards = replace(guards, values=lambda times, states: values(times, states)[:, : machine.guards])
-    if problem.switches is not None and machine.switches:
-        switches = lambda times, states: values(times, states)[:, machine.guards :]  # noqa: E731
-    return changed(problem, guards=guards, switches=switches)
+    guards = partial(of_many, machine.watched, machine.guards + machine.switches)
+    rates = partial(of_many, machine.rates, problem.x0.size)
+    return changed(
+        problem, rates=rates, guards=replace(problem.guards, values=lambda t, x: guards(t, x)[:, : machine.guards])
+    )
 
 
 class _Taken(NamedTuple):
-    """A step as dense output makes it again: its piece, start in s, length in s and state (n,) at the start."""
+    """Steps as dense output makes them again.
 
-    piece: SmoothInterval
-    start: float
-    length: float
-    state: Array
+    Args:
+        spans: (s, 2) of each step the earliest and latest time in s at which the system is evaluated.
+        starts: (s,) of the steps, s.
+        lengths: (s,) of the steps, s.
+        states: (s, n) at their starts.
+    """
+
+    spans: Array
+    starts: Array
+    lengths: Array
+    states: Array
 
 
 class _MachineDense:
@@ -87,22 +94,18 @@ class _MachineDense:
     Args:
         machine: the system.
         steps: (s + 1,) ends of the steps in s, the start first.
-        taken: (s,) the steps.
+        taken: the steps.
     """
 
-    def __init__(self, machine: MachineRates, steps: Array, taken: list[_Taken]) -> None:
-        self._machine, self.steps = machine, steps
-        self._spans = np.array([(step.piece.low, step.piece.high) for step in taken]).reshape(-1, 2)
-        self._starts, self._lengths = (np.array([step[k] for step in taken]) for k in (1, 2))
-        self.states = np.array([step.state for step in taken])
+    def __init__(self, machine: MachineRates, steps: Array, taken: _Taken) -> None:
+        self._machine, self.steps, self._taken = machine, steps, taken
 
     def __call__(self, times: Array) -> Array:
         times = np.atleast_1d(np.asarray(times, dtype=float))
-        order = np.argsort(times, kind="stable")
-        numbers = np.clip(np.searchsorted(self.steps, times[order], side="right") - 1, 0, len(self._starts) - 1)
-        values = np.empty((times.size, self.states.shape[1]))
-        rates, p = self._machine.rates.address, self._machine.p
-        between(rates, p, self._spans, self._starts, self._lengths, self.states, numbers, times[order], values)
+        order = times.argsort(kind="stable")
+        taken, numbers = self._taken, self.steps[1:-1].searchsorted(times[order], side="right")
+        values = np.empty((times.size, taken.states.shape[1]))
+        between(_system(self._machine, 0.0, 0.0), *taken, numbers, times[order], values)
         states = np.empty_like(values)
         states[order] = values
         return states
@@ -173,6 +176,11 @@ class MachineSteps:
         return True
 
 
+def _system(machine: MachineRates, low: float, high: float) -> tuple[int, int, int, float, float, Array]:
+    """A system as `dormand_prince_loops` takes it, with the earliest and latest time in s at which it is evaluated."""
+    return machine.rates.address, machine.watched.address, machine.guards, low, high, machine.p
+
+
 class _MachineStepper:
     """The method.
 
@@ -187,115 +195,64 @@ class _MachineStepper:
 
     def __init__(self, problem: Problem, machine: MachineRates, longest: float) -> None:
         self._problem, self._machine, self._longest = problem, machine, longest
-        self._watches = problem.guards is not None or problem.switches is not None
-        self._taken: list[_Taken] = []
-        self._ahead = FIRST_AHEAD
-        self.tried = 0
+        self._taken, self.tried, self._steps = list[_Taken](), 0, 0
+        self._clearance = CLEARANCE * float(np.spacing(max(abs(problem.t0), abs(problem.t_end))))
+        self._uneven, guards, count = uneven(problem.x0.size), problem.guards, machine.guards
+        self._course = np.zeros((COURSE, count + machine.switches))
+        sides, offsets, _ = self._course[-3:]
+        if guards is not None:
+            sides[:count], offsets[:count] = -guards.sides, guards.offsets
+        watched = sides != 0
+        watched[count:] = problem.switches is not None
+        self._places = np.flatnonzero(watched)
 
     def dense(self, steps: Array) -> _MachineDense:
         """The motion between the ends (s + 1,) of the steps that were taken."""
-        return _MachineDense(self._machine, steps, self._taken)
+        return _MachineDense(self._machine, steps, _Taken(*map(np.concatenate, zip(*self._taken, strict=True))))
 
-    def open(self, piece: SmoothInterval, t: float, x: Array) -> Array:
-        self._piece, self._end, self._limit = piece, piece.end, self._longest
-        self.length, self._ahead = self._first_step(t, x), FIRST_AHEAD
+    def open(self, piece: SmoothInterval, t: float, x: Array) -> Array:  # noqa: ARG002 (the loops look there)
+        self._piece, self._end, self._limit, self.length = piece, piece.end, self._longest, 0.0
+        self._course[-1], self._rested = 0.0, 0.0
         return x
 
     def resume(self, at: MachineSnapshot, end: float) -> None:
         """Go on to a time in s at once."""
-        self._piece, self._end, self._limit, self._ahead = at.piece, end, at.longest, MOST_SMOOTH
-        self.length = at.length or self._first_step(at.t, at.x)
+        self.open(at.piece, at.t, at.x)
+        self._end, self._limit, self.length = end, at.longest, at.length
 
     def step(self, t: float, x: Array) -> Step:
-        if t >= self._end:  # up to a switch
-            self._end, self._limit = self._piece.end, self._longest
-        room = min(self._ahead, max(1, self._problem.max_steps - len(self._taken)))
+        problem, x = self._problem, np.ascontiguousarray(x)
+        room = max(1, min(MOST_AHEAD, problem.max_steps - self._steps))
         ends, lengths, states = np.empty(room), np.empty(room), np.empty((room, x.size))
-        middles, piece, machine = np.empty((room if self._watches else 0, x.size)), self._piece, self._machine
-        rates, p, span, x = machine.rates.address, machine.p, np.array([piece.low, piece.high]), np.ascontiguousarray(x)
-        limits = np.array([t, self._end, self.length, self._limit])
-        count, following, tried = advance(
-            rates, p, span, limits, x, self._problem.atol, self._problem.rtol, ends, lengths, states, FIRST[0],
-            middles,
+        limits = np.array([t, self._end, self.length, self._limit, self._clearance, self._rested, 0.0])
+        count, self.length, tried, guard, unclear = advance(
+            _system(self._machine, self._piece.low, self._piece.high), self._places, self._course, limits,
+            x, problem.atol, problem.rtol, self._uneven, ends, lengths, states,
         )  # fmt: skip
         self.tried += tried
         if not count:
             raise self._failure(t, x)
+        ends, states = ends[:count].copy(), states[:count].copy()
+        self._steps += count
         starts, begun = np.append(t, ends[: count - 1]), np.vstack([x, states[: count - 1]])
-        steps = [_Taken(piece, *step) for step in zip(starts.tolist(), lengths.tolist(), begun, strict=False)]
-        batch = _MachineDense(self._machine, np.append(t, ends[:count]), steps)
-        first = self._clear(batch, ends[:count], states[:count], middles) if self._watches else count
-        number = min(first, count - 1)
-        self._ahead = min(2 * self._ahead, MOST_AHEAD) if first == count else FIRST_AHEAD
-        self.length = following if number == count - 1 else lengths[number + 1]
-        self._taken += steps[:number]
-        self._last = steps[number]
-        before = (ends[:number], states[:number]) if number else None
-        return Step(ends[number], states[number], batch, before, clear=first == count)
+        spans = np.full((count, 2), (self._piece.low, self._piece.high))
+        self._made = _Taken(spans, starts, lengths[:count].copy(), begun)
+        before, last = (ends[:-1], states[:-1]) if count > 1 else None, count - 1
+        dense = _MachineDense(self._machine, starts[last:], _Taken(*(values[last:] for values in self._made)))
+        self._rested = limits[5]
+        met = (float(starts[last] + limits[6] * lengths[last]), guard) if guard >= 0 and not unclear else None
+        clear, rests = guard < 0 and not unclear, self._rested >= RESTING
+        return Step(ends[last], states[last], dense, before, clear=clear, met=met, rests=rests)
 
     def again(self, t: float, x: Array, end: float, longest: float) -> None:  # noqa: ARG002 (it starts as it did)
-        self._end, self._limit, self._ahead = end, min(longest, self._longest), FIRST_AHEAD
+        self._taken.append(_Taken(*(values[:-1] for values in self._made)))
+        self._end, self._limit, self._steps = end, min(longest, self._longest), self._steps - 1
 
-    def take(self, t: float, end: float, state: Array) -> None:  # noqa: ARG002 (it can be made again)
-        self._taken.append(self._last)
-
-    def _clear(self, batch: _MachineDense, ends: Array, states: Array, middles: Array) -> int:
-        """How many of the first steps are so far from all guards and switches that they need no closer look.
-
-        Args:
-            batch: the steps.
-            ends: (k,) of the steps, s.
-            states: (k, n) there.
-            middles: (k, n) inside them, at `FIRST`.
-        """
-        starts, count = batch.steps[:-1], ends.size
-        points = np.vstack([batch.states[:1], middles[:count], states])
-        values = self._watched(np.concatenate([starts[:1], starts + FIRST * (ends - starts), ends]), points)
-        middle, after = values[1 : count + 1], values[count + 1 :]
-        before = np.vstack([values[:1], after[:-1]])
-        low, high = np.minimum(np.minimum(before, middle), after), np.maximum(np.maximum(before, middle), after)
-        far = ((np.minimum(np.abs(low), np.abs(high)) > 2 * (high - low)) | (low == high)).all(axis=1)
-        near = np.flatnonzero(~far)
-        if near.size:
-            times = starts[near, None] + LATER * (ends - starts)[near, None]
-            inside = self._watched(times.ravel(), batch(times.ravel())).reshape(*times.shape, -1)
-            course = np.concatenate([before[near, None], inside, after[near, None]], axis=1)
-            heights = course * np.sign(before[near, None])
-            _, low = vertices(np.column_stack([starts[near], times, ends[near]]), heights)
-            still = (course == before[near, None]).all(axis=1)
-            far[near] = ((heights > 0).all(axis=1) & ~low.any(axis=1) | still).all(axis=1)
-            near = np.flatnonzero(~far)
-        return int(near[0]) if near.size else count
-
-    def _watched(self, times: Array, states: Array) -> Array:
-        """(k, m) all that is watched at times (k,) and states (k, n); guards beyond their limits are NaN."""
-        problem, watched, times = self._problem, list[Array](), np.clip(times, self._piece.low, self._piece.high)
-        if problem.guards is not None:
-            guards = problem.guards
-            active = guards.sides != 0
-            values = (guards.values(times, states) * guards.sides - guards.offsets)[:, active]
-            watched.append(np.where(values < 0, values, np.nan))
-        if problem.switches is not None:
-            watched.append(problem.switches(times, states))
-        return np.hstack(watched)
-
-    def _first_step(self, t: float, x: Array) -> float:
-        """A first step in s of which the error is small: Hairer, section II.4."""
-        functions, scale = self._functions(), self._problem.atol + self._problem.rtol * np.abs(x)
-        slope = functions.rhs(t, x)
-        size, speed = (float(np.sqrt(np.mean((vector / scale) ** 2))) for vector in (x, slope))
-        guess = 0.01 * size / speed if size > 1e-5 and speed > 1e-5 else 1e-6
-        guess = min(guess, self._piece.end - t)
-        bend = float(np.sqrt(np.mean(((functions.rhs(t + guess, x + guess * slope) - slope) / scale) ** 2))) / guess
-        largest = max(speed, bend)
-        step = max(1e-6, 1e-3 * guess) if largest <= 1e-15 else (0.01 / largest) ** (1 / 8)
-        return min(100 * guess, step, self._limit)
-
-    def _functions(self) -> GuardedFunctions:
-        return GuardedFunctions(self._problem, self._piece)
+    def take(self, t: float, end: float, state: Array) -> None:  # noqa: ARG002 (they can be made again)
+        self._taken.append(self._made)
 
     def _failure(self, t: float, x: Array) -> Exception:
         """Why no step could be made."""
-        functions = self._functions()
+        functions = GuardedFunctions(self._problem, self._piece)
         functions.rhs(t, x)
         return failure(self._problem, "numba", t, x, "the step became too small", functions)

@@ -1,11 +1,13 @@
 """Steps of Dormand and Prince's method of order 8(5,3), many of them in one call, compiled by numba.
 
 A system is a function rates(t, x, p, dx) in machine code. What is compiled here knows it by its address, so that it is
-compiled once for all systems, and numba keeps it for other processes.
+compiled once for all systems, and numba keeps it for other processes. Numbers are copied one by one: to compile `a[:] =
+b` takes numba a second.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -13,13 +15,18 @@ import numpy as np
 from numba import njit, types
 from scipy.integrate import DOP853
 
+from shaftwork.integrate.crossings import LEFT, RESTING
 from shaftwork.numerics.machine_code import MATRIX, VECTOR, call_at
+from shaftwork.numerics.tolerances import EPS
+from shaftwork.numerics.zeros import LOOKS
 
 STAGES, FURTHER, SHAPES = 12, 3, 7
 """Stages of a step, those that dense output needs besides the slope at the end, and the shapes that make it."""
 WEIGHTS = np.vstack([DOP853.B, DOP853.E5[:STAGES], DOP853.E3[:STAGES]])
 BEFORE, AFTER = np.ascontiguousarray(DOP853.A), np.ascontiguousarray(DOP853.A_EXTRA)
 NODES, LATER, DENSE = DOP853.C.copy(), DOP853.C_EXTRA.copy(), np.ascontiguousarray(DOP853.D)
+PARTS = np.array([0.0, *LOOKS, 1.0])
+"""Where a step near a guard or a switch is looked at, as parts of it."""
 
 
 def _compiled(signature: Any) -> Callable[[Any], Any]:
@@ -34,35 +41,61 @@ def _compiled(signature: Any) -> Callable[[Any], Any]:
     return decorate
 
 
-_F = types.int64  # the address of a system
-_part = njit(error_model="numpy")
+_part = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, no_rewrites=True)  # type: ignore[call-overload]
+"""Compile a function that others here alone call, without what would let Python call it."""
+_PLACES = types.Array(types.int64, 1, "C")
+_SYSTEM = types.Tuple((types.int64, types.int64, types.int64, types.float64, types.float64, VECTOR))  # type: ignore[no-untyped-call]
+"""Addresses of its rates and of what is watched, how many of that are guards, the earliest and the latest time in s at
+which both are evaluated, and their parameters."""
+COURSE = PARTS.size + 5
+"""Rows of what is watched in a step: at its parts, anywhere, at its start moved by the tolerance; the sides and offsets
+with which it is a height above zero; and how often in a row the motion has rested at a switch."""
 
 
 @_part
-def _stage(slopes, count, factors, x, step, y):  # type: ignore[no-untyped-def]
-    """Write into y (n,) the state at the next stage, behind `count` of them."""
-    y[:] = x
-    for j in range(count):
+def _copy(x, y):  # type: ignore[no-untyped-def]
+    for i in range(x.size):
+        y[i] = x[i]
+
+
+@_part
+def _rates(system, t, x, slope):  # type: ignore[no-untyped-def]
+    rates, _, _, low, high, p = system
+    call_at(rates, min(max(t, low), high), x, p, slope)
+
+
+@_part
+def _values(system, t, x, values):  # type: ignore[no-untyped-def]
+    _, watched, _, low, high, p = system
+    call_at(watched, min(max(t, low), high), x, p, values)
+
+
+@_part
+def _stage(slopes, factors, x, step, y):  # type: ignore[no-untyped-def]
+    """Write into y (n,) the state at the next stage."""
+    _copy(x, y)
+    for j in range(factors.size):
         factor = step * factors[j]
-        for i in range(x.size):
-            y[i] += factor * slopes[j, i]
+        if factor != 0:  # those of later stages are zero
+            for i in range(x.size):
+                y[i] += factor * slopes[j, i]
 
 
 @_part
-def _all_stages(rates, p, span, t, x, step, slopes, y, end):  # type: ignore[no-untyped-def]
+def _all_stages(system, t, x, step, slopes, y, end):  # type: ignore[no-untyped-def]
     """Write the slopes of a step whose first is known, and the state at its end."""
     for stage in range(1, STAGES):
-        _stage(slopes, stage, BEFORE[stage], x, step, y)
-        call_at(rates, min(max(t + NODES[stage] * step, span[0]), span[1]), y, p, slopes[stage])
-    _stage(slopes, STAGES, WEIGHTS[0], x, step, end)
+        _stage(slopes, BEFORE[stage], x, step, y)
+        _rates(system, t + NODES[stage] * step, y, slopes[stage])
+    _stage(slopes, WEIGHTS[0], x, step, end)
 
 
 @_part
-def _shapes(rates, p, span, t, x, step, slopes, y, end, shapes):  # type: ignore[no-untyped-def]
-    """Write what makes the dense output of a step from all its slopes, with that at the end."""
+def _shapes(system, t, x, step, slopes, y, end, shapes):  # type: ignore[no-untyped-def]
+    """Write what makes the dense output of a step from all its slopes, with that at the end; behind it its start."""
     for stage in range(FURTHER):
-        _stage(slopes, STAGES + 1 + stage, AFTER[stage], x, step, y)
-        call_at(rates, min(max(t + LATER[stage] * step, span[0]), span[1]), y, p, slopes[STAGES + 1 + stage])
+        _stage(slopes, AFTER[stage], x, step, y)
+        _rates(system, t + LATER[stage] * step, y, slopes[STAGES + 1 + stage])
     for i in range(x.size):
         change = end[i] - x[i]
         shapes[0, i] = change
@@ -73,91 +106,265 @@ def _shapes(rates, p, span, t, x, step, slopes, y, end, shapes):  # type: ignore
             for j in range(STAGES + 1 + FURTHER):
                 total += DENSE[row, j] * slopes[j, i]
             shapes[3 + row, i] = step * total
+        shapes[SHAPES, i] = x[i]
 
 
 @_part
-def _inside(shapes, x, part, y):  # type: ignore[no-untyped-def]
+def _inside(shapes, part, y):  # type: ignore[no-untyped-def]
     """Write the state at a part of a step."""
-    for i in range(x.size):
+    for i in range(y.size):
         total = 0.0
         for k in range(SHAPES):
             total = (total + shapes[SHAPES - 1 - k, i]) * (part if k % 2 == 0 else 1 - part)
-        y[i] = x[i] + total
+        y[i] = shapes[SHAPES, i] + total
+
+
+@_part
+def _error(slopes, x, new, step, atol, rtol):  # type: ignore[no-untyped-def]
+    """Of a step, in parts of its tolerance."""
+    fifth, third = 0.0, 0.0
+    for i in range(x.size):
+        scale, a, b = atol[i] + rtol * max(abs(x[i]), abs(new[i])), 0.0, 0.0
+        for j in range(STAGES):
+            a += WEIGHTS[1, j] * slopes[j, i]
+            b += WEIGHTS[2, j] * slopes[j, i]
+        fifth += (a / scale) ** 2
+        third += (b / scale) ** 2
+    whole = fifth + 0.01 * third
+    return step * fifth / math.sqrt(whole * x.size) if whole > 0 else whole
+
+
+@_part
+def _factor(error, most):  # type: ignore[no-untyped-def]
+    """How many times as long the next step may be."""
+    if error == 0:
+        return most
+    return min(most, max(0.2, 0.9 * error**-0.125)) if error < np.inf else 0.2
+
+
+@_part
+def _first_step(system, t, x, slope, limits, atol, rtol, y, other):  # type: ignore[no-untyped-def]
+    """A first step in s of which the error is small: Hairer, section II.4."""
+    size, speed, bend, n = 0.0, 0.0, 0.0, max(x.size, 1)
+    for i in range(x.size):
+        scale = atol[i] + rtol * abs(x[i])
+        size, speed = size + (x[i] / scale) ** 2, speed + (slope[i] / scale) ** 2
+    size, speed = math.sqrt(size / n), math.sqrt(speed / n)
+    guess = min(0.01 * size / speed if size > 1e-5 and speed > 1e-5 else 1e-6, limits[1] - t)
+    for i in range(x.size):
+        y[i] = x[i] + guess * slope[i]
+    _rates(system, t + guess, y, other)
+    for i in range(x.size):
+        bend += ((other[i] - slope[i]) / (atol[i] + rtol * abs(x[i]))) ** 2
+    largest = max(speed, math.sqrt(bend / n) / guess)
+    step = max(1e-6, 1e-3 * guess) if largest <= 1e-15 else (0.01 / largest) ** 0.125
+    return min(100 * guess, step, limits[3])
+
+
+@_part
+def _height(course, row, c):  # type: ignore[no-untyped-def]
+    """How far a guard is within its limit, or a switch on the side on which it starts."""
+    side = course[PARTS.size + 2, c]
+    return side * course[row, c] + course[PARTS.size + 3, c] if side != 0 else -abs(course[row, c])
+
+
+@_part
+def _is_near(system, places, t, x, step, slopes, y, new, course):  # type: ignore[no-untyped-def]
+    """Whether a guard or a switch is less than twice as far from zero as it moves in a step.
+
+    Inside it the state is that of the cubic with the right values and slopes at both ends.
+    """
+    last, side = PARTS.size - 1, PARTS.size + 2
+    for i in range(x.size):
+        y[i] = (x[i] + new[i]) / 2 + step / 8 * (slopes[0, i] - slopes[STAGES, i])
+    _values(system, t + step / 2, y, course[1])
+    _values(system, t + step, new, course[last])
+    for c in range(system[2], course.shape[1]):
+        course[side, c] = (course[0, c] > 0) * 1.0 - (course[0, c] < 0)
+    for c in places:
+        low, high, unknown = np.inf, -np.inf, 0.0
+        for row in (0, 1, last):
+            height = _height(course, row, c)
+            low, high, unknown = min(low, height), max(high, height), unknown + 0 * height
+        if not (low > 2 * (high - low) + unknown or (course[side, c] == 0 and low == high)):
+            return True
+    return False
+
+
+@_part
+def _watched(looks, part, row):  # type: ignore[no-untyped-def]
+    """Write what is watched at a part of a step into a row."""
+    system, _, t, step, shapes, course = looks
+    _inside(shapes, part, shapes[SHAPES + 1])
+    _values(system, t + part * step, shapes[SHAPES + 1], course[row])
+
+
+@_part
+def _leaves(looks, c, band):  # type: ignore[no-untyped-def]
+    """Parts of a step between which a height falls below zero by more than a band; -1 where it does not.
+
+    It may between two rows, near the vertex of a parabola through three heights, as `crossings.vertices` has them.
+    """
+    _, _, _, _, _, course = looks
+    before, last = 0.0, PARTS.size - 1
+    for row in range(1, PARTS.size):
+        here = _height(course, row, c)
+        if here < -band:
+            return before, PARTS[row]
+        before = PARTS[row] if here >= 0 else before
+        left, right = row - 1, min(row + 1, last)
+        ta, tb, tc = PARTS[left], PARTS[row], PARTS[right]
+        a, b, d = _height(course, left, c), here, _height(course, right, c)
+        for _ in range(3):
+            first, second = (b - a) / (tb - ta), (d - b) / (tc - tb)
+            bend, slope = (second - first) / (tc - ta), (first * (tc - tb) + second * (tb - ta)) / (tc - ta)
+            at = tb - slope / (2 * bend)
+            if not (0 < b <= min(a, d) and bend > 0 and ta < at < tc and b - slope**2 / (4 * bend) < b / 2):
+                break
+            _watched(looks, at, PARTS.size)
+            new = _height(course, PARTS.size, c)
+            if new < -band:
+                return ta if at < tb else tb, at
+            if at < tb:
+                ta, a, tb, b, tc, d = (ta, a, at, new, tb, b) if new < b else (at, new, tb, b, tc, d)
+            else:
+                ta, a, tb, b, tc, d = (tb, b, at, new, tc, d) if new < b else (ta, a, tb, b, at, new)
+    return -1.0, -1.0
+
+
+@_part
+def _first_met(looks, atol, rtol, uneven):  # type: ignore[no-untyped-def]
+    """The part of a step at which a switch leaves its side first and this switch, the same of a guard, or -1 for none;
+    and whether a guard is beyond its limit from the start, or has no value anywhere.
+
+    A switch at which the motion rests is not looked at.
+    """
+    system, places, t, step, shapes, course = looks
+    y, moved, rests = shapes[SHAPES + 1], course[PARTS.size + 1], course[PARTS.size + 4]
+    for row in range(1, PARTS.size - 1):
+        _watched(looks, PARTS[row], row)
+    for i in range(y.size):
+        y[i] = shapes[SHAPES, i] + uneven[i] * (atol[i] + rtol * abs(shapes[SHAPES, i]))
+    _values(system, t, y, moved)
+    first, met, part, guard, unclear = 2.0, -1, 2.0, -1, False
+    for c in places:
+        is_guard, band = c < system[2], abs(moved[c] - course[0, c])
+        if is_guard:
+            band, unknown = 0.0, 0.0
+            for row in range(PARTS.size):
+                unknown += 0 * _height(course, row, c)
+            unclear |= not _height(course, 0, c) > unknown
+        elif abs(course[0, c]) > LEFT * band:
+            rests[c] = 0
+        low, high = _leaves(looks, c, band) if rests[c] < RESTING else (-1.0, -1.0)
+        if course[PARTS.size + 2, c] == 0:
+            low, high = 0.0, min(high, 0.0)  # it leaves zero at once
+        while high - low > EPS * max(abs(t), abs(t + step)) / step:
+            middle = (low + high) / 2
+            _watched(looks, middle, PARTS.size)
+            low, high = (middle, high) if _height(course, PARTS.size, c) >= 0 else (low, middle)
+        if is_guard and 0 <= high < part:
+            part, guard = high, c
+        elif not is_guard and high >= 0 and low < first:
+            first, met = low, c
+    return first, met, part, guard, unclear
+
+
+@_part
+def _end_at_switch(looks, part, c, end, limits, atol, rtol, rate):  # type: ignore[no-untyped-def]
+    """The time in s at which a step has to end for a switch that leaves its side, if there is one; else infinite.
+
+    It is that of `Crossings.cut`.
+    """
+    if c < 0:
+        return np.inf
+    system, _, t, step, shapes, course = looks
+    y, rests = shapes[SHAPES + 1], course[PARTS.size + 4]
+    time, longest, value = t + part * step, np.inf, course[0, c]
+    _inside(shapes, part, y)
+    _rates(system, time, y, rate)
+    for i in range(y.size):
+        if rate[i] != 0:
+            longest = min(longest, (atol[i] + rtol * abs(y[i])) / abs(rate[i]))
+    past, clearance = min(0.01 * longest, step), limits[4]
+    if end - time > max(4 * past, clearance):
+        rests[c] += value == 0
+        return time + max(past, clearance / 2)
+    near = abs(value) <= LEFT * abs(course[PARTS.size + 1, c] - value)
+    rests[c], limits[5] = near * (rests[c] + 1), near * (limits[5] + 1)
+    return end
 
 
 @_compiled(
-    types.Tuple((types.int64, types.float64, types.int64))(  # type: ignore[no-untyped-call]
-        _F, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, types.float64, VECTOR, VECTOR, MATRIX, types.float64, MATRIX
+    types.Tuple((types.int64, types.float64, types.int64, types.int64, types.boolean))(  # type: ignore[no-untyped-call]
+        _SYSTEM, _PLACES, MATRIX, VECTOR, VECTOR, VECTOR, types.float64, VECTOR, VECTOR, VECTOR, MATRIX
     )
 )
-def advance(rates, p, span, limits, x, atol, rtol, ends, lengths, states, part, middles):  # type: ignore[no-untyped-def]
-    """Make steps until there is no room for more, the end is reached, or one becomes too small.
+def advance(system, places, course, limits, x, atol, rtol, uneven, ends, lengths, states):  # type: ignore[no-untyped-def]
+    """Make steps until there is no room for more, the end is reached, a guard is met or one becomes too small.
+
+    Each of them ends just past the first switch that it meets.
 
     Args:
-        rates: address of the system.
-        p: its parameters.
-        span: the earliest and the latest time in s at which it is evaluated.
-        limits: time at the start, end, first step and longest step, s.
+        system: see `_SYSTEM`.
+        places: of the guards and switches that are watched, in all of them.
+        course: see `COURSE`; (COURSE, 0) where nothing is.
+        limits: time at the start, end, first step or zero, longest step and clearance, s. Two that are written: how
+            often in a row the motion has rested at any switch, and the part of the last step at which the guard is met.
         x: (n,) state at the start.
-        atol: (n,) absolute tolerances.
-        rtol: relative one.
-        ends: (k,) takes the times at the ends of the steps, s.
-        lengths: (k,) takes their lengths, s.
-        states: (k, n) takes the states there.
-        part: of a step,
-        middles: (k, n) takes the states there; (0, n) if nobody looks at them.
+        atol, rtol, uneven: (n,) absolute tolerances, the relative one, and (n,) parts by which they move states.
+        ends, lengths, states: (k,), (k,) and (k, n) take the ends of the steps and their lengths in s, and the states.
 
     Returns:
-        How many steps were made, the length of the next one in s, and how many were tried.
+        How many steps were made, the length of the next one in s, how many were tried, the guard that is met in the
+        last one, or -1, and whether its guards need a closer look.
     """
-    n, (t, end, step, longest) = x.size, limits
-    slopes, shapes = np.empty((STAGES + 1 + FURTHER, n)), np.empty((SHAPES, n))
-    begin, y, new = x.copy(), np.empty(n), np.empty(n)
-    call_at(rates, min(max(t, span[0]), span[1]), x, p, slopes[0])
-    count, tried, shrunk = 0, 0, False
-    while count < ends.size and t < end:
-        if not step > 10 * np.spacing(abs(t)):
+    n, m, t, end, step, longest = x.size, places.size, limits[0], limits[1], limits[2], limits[3]
+    slopes, shapes = np.empty((STAGES + 1 + FURTHER, n)), np.empty((SHAPES + 2, n))
+    y, new = np.empty(n), np.empty(n)
+    count, tried, shrunk, attempts, whole, stop, guard, unclear = 0, 0, False, 0, 0.0, end, -1, False
+    _rates(system, t, x, slopes[0])
+    if m:
+        _values(system, t, x, course[0])
+    if not step > 0:
+        step = _first_step(system, t, x, slopes[0], limits, atol, rtol, y, new)
+    while count < ends.size and t < end and guard < 0 and not unclear:
+        if not step > 10 * EPS * abs(t):
             break
-        left = end - t
-        last = min(step, longest) >= left
-        length = left if last else min(step, longest)
-        _all_stages(rates, p, span, t, begin, length, slopes, y, new)
+        last = min(step, longest) >= stop - t
+        length = stop - t if last else min(step, longest)
+        _all_stages(system, t, x, length, slopes, y, new)
         tried += 1
-        fifth, third = 0.0, 0.0
-        for i in range(n):
-            scale, a, b = atol[i] + rtol * max(abs(begin[i]), abs(new[i])), 0.0, 0.0
-            for j in range(STAGES):
-                a += WEIGHTS[1, j] * slopes[j, i]
-                b += WEIGHTS[2, j] * slopes[j, i]
-            fifth += (a / scale) ** 2
-            third += (b / scale) ** 2
-        whole = fifth + 0.01 * third
-        error = length * fifth / np.sqrt(whole * n) if whole > 0 else whole
-        if not error < 1:
-            step = length * (max(0.2, 0.9 * error**-0.125) if error >= 1 and error < np.inf else 0.2)
-            shrunk = True
+        error = _error(slopes, x, new, length, atol, rtol)
+        step = length * _factor(error, 10.0 if error < 1 and not shrunk else 1.0)
+        shrunk = not error < 1
+        if shrunk:
             continue
-        factor = min(10.0, max(0.2, 0.9 * error**-0.125)) if error > 0 else 10.0
-        step = length * (min(1.0, factor) if shrunk else factor)
-        shrunk = False
-        reached = end if last else t + length
-        call_at(rates, min(max(reached, span[0]), span[1]), new, p, slopes[STAGES])
-        if middles.shape[0]:
-            _shapes(rates, p, span, t, begin, length, slopes, y, new, shapes)
-            _inside(shapes, begin, part, middles[count])
-        ends[count], lengths[count], states[count] = reached, length, new
-        t, begin[:], slopes[0] = reached, new, slopes[STAGES]
-        count += 1
-    return count, step, tried
+        reached = stop if last else t + length
+        _rates(system, reached, new, slopes[STAGES])
+        if m and _is_near(system, places, t, x, length, slopes, y, new, course):
+            looks = (system, places, t, length, shapes, course)
+            _shapes(system, t, x, length, slopes, y, new, shapes)
+            part, met, limits[6], guard, unclear = _first_met(looks, atol, rtol, uneven)
+            switch = _end_at_switch(looks, part, met, reached, limits, atol, rtol, slopes[STAGES + 1])
+            if switch < reached:  # after four attempts that do not converge, half of it
+                attempts, whole, guard, unclear = attempts + 1, max(whole, length), -1, False
+                stop = switch if attempts <= 4 else min(switch, t + length / 2)
+                continue
+        ends[count], lengths[count], x = reached, length, states[count]
+        _copy(new, x)
+        _copy(slopes[STAGES], slopes[0])
+        _copy(course[PARTS.size - 1], course[0])
+        t, stop, step, attempts, whole, count = reached, end, max(whole, step), 0, 0.0, count + 1
+    return count, step, tried, guard, unclear
 
 
-@_compiled(types.void(_F, VECTOR, MATRIX, VECTOR, VECTOR, MATRIX, types.Array(types.int64, 1, "C"), VECTOR, MATRIX))
-def between(rates, p, spans, starts, lengths, states, numbers, times, values):  # type: ignore[no-untyped-def]
+@_compiled(types.void(_SYSTEM, MATRIX, VECTOR, VECTOR, MATRIX, _PLACES, VECTOR, MATRIX))
+def between(system, spans, starts, lengths, states, numbers, times, values):  # type: ignore[no-untyped-def]
     """Write the states at times inside steps, which are made again.
 
     Args:
-        rates: address of the system.
-        p: its parameters.
+        system: see `_SYSTEM`.
         spans: (s, 2) of each step the earliest and latest time in s at which the system is evaluated.
         starts: (s,) of the steps, s.
         lengths: (s,) of the steps, s.
@@ -167,30 +374,23 @@ def between(rates, p, spans, starts, lengths, states, numbers, times, values):  
         values: (k, n) takes the states.
     """
     n, prepared = states.shape[1], -1
-    slopes, shapes = np.empty((STAGES + 1 + FURTHER, n)), np.empty((SHAPES, n))
+    slopes, shapes = np.empty((STAGES + 1 + FURTHER, n)), np.empty((SHAPES + 1, n))
     y, end = np.empty(n), np.empty(n)
     for k in range(times.size):
         number = numbers[k]
-        t, length, x, span = starts[number], lengths[number], states[number], spans[number]
+        t, length, x = starts[number], lengths[number], states[number]
         if number != prepared:
-            call_at(rates, min(max(t, span[0]), span[1]), x, p, slopes[0])
-            _all_stages(rates, p, span, t, x, length, slopes, y, end)
-            call_at(rates, min(max(t + length, span[0]), span[1]), end, p, slopes[STAGES])
-            _shapes(rates, p, span, t, x, length, slopes, y, end, shapes)
+            here = (system[0], system[1], system[2], spans[number, 0], spans[number, 1], system[5])
+            _rates(here, t, x, slopes[0])
+            _all_stages(here, t, x, length, slopes, y, end)
+            _rates(here, t + length, end, slopes[STAGES])
+            _shapes(here, t, x, length, slopes, y, end, shapes)
             prepared = number
-        _inside(shapes, x, (times[k] - t) / length, values[k])
+        _inside(shapes, (times[k] - t) / length, values[k])
 
 
-@_compiled(types.void(_F, VECTOR, VECTOR, MATRIX, MATRIX))
-def watch(watched, p, times, states, values):  # type: ignore[no-untyped-def]
-    """Write what is watched at times and states.
-
-    Args:
-        watched: address of what writes it.
-        p: parameters.
-        times: (k,) s.
-        states: (k, n) then.
-        values: (k, m) takes it.
-    """
+@_compiled(types.void(types.int64, VECTOR, VECTOR, MATRIX, MATRIX))
+def values_at(code, p, times, states, values):  # type: ignore[no-untyped-def]
+    """Write rates or what is watched (k, m), by the address of its code, at times (k,) in s and states (k, n)."""
     for k in range(times.size):
-        call_at(watched, times[k], states[k], p, values[k])
+        call_at(code, times[k], states[k], p, values[k])

@@ -11,11 +11,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import sparse
 
 from shaftwork.integrate.linear.linear_system import OWN_INTERVALS
 from shaftwork.integrate.problem import Array, Observed, Problem, Trajectory
-from shaftwork.integrate.stiffness import LARGEST_EIGENVALUES, balance, scale_by
+from shaftwork.integrate.stiffness import balance, full_where_small, jacobians_at, scale_by
 
 # From this part of the largest value of its kind on rounding is worth saying, and a run in whole numbers worth making.
 # It is an estimate, no bound: with it none of 1771 random networks, parameters from 1e-12 to 1e12, is off by 1e-6
@@ -100,18 +99,14 @@ def _parts(problem: Problem, times: Array, states: Array) -> list[_Part]:
     if problem.jacobian is None:
         nothing = np.zeros((problem.x0.size, problem.x0.size))
         return [_Part(nothing, nothing, nothing.sum(axis=0), nothing.sum(axis=0) + 1)] * times.size
-    return _split([problem.jacobian(float(t), x) for t, x in zip(times, states, strict=True)])
+    return _split(jacobians_at(problem, times, states))
 
 
 def _split(matrices: list[Any]) -> list[_Part]:
-    if matrices[0].shape[0] <= LARGEST_EIGENVALUES:  # full ones are by far the faster
-        rows = [matrix.toarray() for matrix in matrices]
-        for matrix in rows:
-            matrix[~np.isfinite(matrix)] = 0.0  # a slope at a point where the law has none
-    else:
-        rows = [sparse.csr_array(matrix) for matrix in matrices]
-        for matrix in rows:
-            matrix.data[~np.isfinite(matrix.data)] = 0.0
+    rows = [full_where_small(matrix) for matrix in matrices]
+    for matrix in rows:  # without slopes at a point where the law has none
+        entries = matrix if isinstance(matrix, np.ndarray) else matrix.data
+        entries[~np.isfinite(entries)] = 0.0
     scale = balance(sum(abs(matrix) for matrix in rows))
     parts = []
     for matrix in rows:
