@@ -25,7 +25,7 @@ from shaftwork.fitting.curves import (
 )
 from shaftwork.fitting.estimation import LOSSES, Data, estimate
 from shaftwork.fitting.fit_result import AT_START, Fit
-from shaftwork.fitting.records import RecordedSeries, read_records
+from shaftwork.fitting.fitted_records import RecordedSeries, read_records
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import checked_parameter, checked_parameters, range_of, relative_tolerance, repeated
 from shaftwork.pipeline.model import Model

@@ -29,7 +29,7 @@ from shaftwork.sweep.ensemble_equations import (
     VariantGroup,
     joined,
 )
-from shaftwork.sweep.lane_tables import A_LIMIT, NOTHING, THE_END, LaneCourse
+from shaftwork.sweep.lane_tables import LaneCourse, Met
 
 
 class Ensemble:
@@ -210,7 +210,7 @@ class _VariantCourse:
         begin, ends, highs = equations.pieces(group.t, p, self.ensemble.span)
         entry = equations.entered(begin, group.x, p)
         following = self._past_guards(equations, group, entry.met)
-        on = entry.met == NOTHING
+        on = entry.met == Met.NOTHING
         group, p = group.some(on), p[:, on]
         course = self._course(equations, group, p, entry.some(on), (begin[on], ends[on], highs[on]))
         program.follow(course, equations.sizes, self.ensemble.rtol, self.ensemble.span)
@@ -218,10 +218,10 @@ class _VariantCourse:
             self.values[place, group.lanes] += course.integrals[row]
         self.values[:, group.lanes] = np.where(self._extreme[:, None], course.best, self.values[:, group.lanes])
         there, met = VariantGroup(group.modes, group.lanes, course.t, course.x, course.steps), course.met
-        over = (met == THE_END) & (course.t >= self.ensemble.span[1])
+        over = (met == Met.THE_END) & (course.t >= self.ensemble.span[1])
         self._end(equations, there, p, over)
-        onward = (met == THE_END) & ~over | (met >= program.guards)  # in the same modes
-        met = np.where(met < program.guards, met, NOTHING)
+        onward = (met == Met.THE_END) & ~over | (met >= program.guards)  # in the same modes
+        met = np.where(met < program.guards, met, Met.NOTHING)
         return [*following, there.some(onward), *self._past_guards(equations, there, met)]
 
     def _past_guards(self, equations: EnsembleEquations, group: VariantGroup, met: Index) -> list[VariantGroup]:
@@ -239,7 +239,7 @@ class _VariantCourse:
             sides[: program.guards], offsets[: program.guards] = equations.sides[:, None], entry.offsets
         begin, ends, highs = (np.ascontiguousarray(one) for one in pieces)
         integrals, best = np.zeros((len(program.integrated), count)), self.values[:, group.lanes]
-        met = np.full(count, A_LIMIT)
+        met = np.full(count, Met.A_LIMIT)
         x, p = np.ascontiguousarray(group.x), np.ascontiguousarray(p)
         return LaneCourse(
             begin,

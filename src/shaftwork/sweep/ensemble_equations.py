@@ -18,7 +18,7 @@ from shaftwork.formulation.observables import Observables
 from shaftwork.pipeline.model import Model
 from shaftwork.results.measures import Measure
 from shaftwork.sweep.lane_program import lane_program
-from shaftwork.sweep.lane_tables import NOTHING
+from shaftwork.sweep.lane_tables import Met
 
 Mask = NDArray[np.bool_]
 ModeNames = tuple[str, ...]
@@ -75,7 +75,7 @@ class PhaseEntry:
     """Where variants enter a phase.
 
     Args:
-        met: (k,) NOTHING where its modes are consistent with the motion, the guard that alone is not, or A_LIMIT.
+        met: (k,) the guard that alone contradicts its modes; else NOTHING where none does, or A_LIMIT.
         offsets: (guards, k) how far beyond zero each guard has to go.
     """
 
@@ -139,7 +139,7 @@ class EnsembleEquations:
 
     def entered(self, t: Array, x: Array, p: Array) -> PhaseEntry:  # noqa: ARG002
         """Whether the modes are consistent with the motion in lanes (k,): without guards they are."""
-        return PhaseEntry(np.full(t.size, NOTHING), np.zeros((0, t.size)))
+        return PhaseEntry(np.full(t.size, Met.NOTHING), np.zeros((0, t.size)))
 
     def leaves_behind(self, before: EnsembleEquations, guard: int) -> bool:
         """Whether the guard by which these modes were entered is met no more; `entered` looks at all the others."""

@@ -32,7 +32,7 @@ from shaftwork.sweep.ensemble_equations import (
     PhaseEntry,
     VariantGroup,
 )
-from shaftwork.sweep.lane_tables import A_LIMIT, NOTHING
+from shaftwork.sweep.lane_tables import Met
 
 Course = tuple[Array, Array, Array, Array]
 """Times (k,), states (n, k), their rates, and guards (guards, k)."""
@@ -135,7 +135,7 @@ class GuardedEquations(EnsembleEquations):
         where = side_of_limit(excess, bands)
         beyond = ((where > 0) | ((where == 0) & (turns > 0))) & (self.sides != 0)[:, None]
         count = beyond.sum(axis=0)
-        met = np.where(count == 0, NOTHING, np.where(count == 1, beyond.argmax(axis=0), A_LIMIT))
+        met = np.where(count == 0, Met.NOTHING, np.where(count == 1, beyond.argmax(axis=0), Met.A_LIMIT))
         return PhaseEntry(met, clear_of_limit(excess, bands))
 
     def _step(self, rates: Array) -> Array:

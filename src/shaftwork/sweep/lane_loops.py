@@ -18,10 +18,8 @@ from shaftwork.codegen.array_form.elements import Array, Index
 from shaftwork.numerics.hermite import JET, peak, powers, reach, root
 from shaftwork.numerics.machine_code import LANES, run_at
 from shaftwork.numerics.tolerances import EPS, ROUNDINGS, TYPED
-from shaftwork.sweep.lane_tables import NOTHING, THE_END
+from shaftwork.sweep.lane_tables import Met
 
-MOST_STEPS = 100_000
-"""A variant that will take more up to its end is stiff, or swings so often that it is better off alone."""
 _compiled = njit(error_model="numpy", cache=True)
 
 
@@ -149,8 +147,8 @@ def _top(tables, lanes, row, sign, offset, best, near, first):  # type: ignore[n
 
 @_compiled
 def _first_met(tables, lanes, lane):  # type: ignore[no-untyped-def]
-    """The guard that is met first in the last step of a lane, and when in s; NOTHING where none is."""
-    now, met, extremes = lanes.now, NOTHING, tables.extremes.shape[0]
+    """The guard that is met first in the last step of a lane, and when in s; Met.NOTHING where none is."""
+    now, met, extremes = lanes.now, Met.NOTHING.value, tables.extremes.shape[0]
     low, high = now[tables.rows.last_time, lane], now[tables.rows.time, lane]
     end = high
     for guard in range(tables.guards):
@@ -174,7 +172,7 @@ def _first_met(tables, lanes, lane):  # type: ignore[no-untyped-def]
         share = (upper - low) / (high - low)
         guess = low + (high - low) * root(powers(high - low, left, right), 0.0, share, 1.0, 8)
         time = _rise(tables, lanes.probe, row, side, offset, low, upper, guess)
-        if time < end or met == NOTHING:
+        if time < end or met == Met.NOTHING.value:
             met, end = guard, time
     return met, end
 
@@ -265,16 +263,16 @@ def _begin(tables, lanes, lane, last):  # type: ignore[no-untyped-def]
 @_compiled
 def _arrived(tables, course, lanes, lane):  # type: ignore[no-untyped-def]
     """Whether a lane is done: it has met a guard in its last step, or is at its end."""
-    now, met = lanes.now, NOTHING
+    now, met = lanes.now, Met.NOTHING.value
     end, last, close = now[tables.rows.time, lane], now[tables.rows.end, lane], now[tables.rows.close, lane] > 0
     if close:
         _repeat(tables, lanes, lane)
         met, end = _first_met(tables, lanes, lane)
-    if met == NOTHING:
+    if met == Met.NOTHING.value:
         if close:
             _measure(tables, lanes, now, lane, lane, end)
         if end >= last:
-            _leave(tables, course, lanes, now, tables.rows.x, lane, lane, end, THE_END)
+            _leave(tables, course, lanes, now, tables.rows.x, lane, lane, end, Met.THE_END.value)
         return end >= last
     _probe(tables, lanes.probe, end)
     if met >= tables.guards - tables.free:
@@ -288,10 +286,13 @@ def _arrived(tables, course, lanes, lane):  # type: ignore[no-untyped-def]
 
 @_compiled
 def _hopeless(tables, now, lane, end):  # type: ignore[no-untyped-def]
-    """Whether the steps of a lane have become too short, or so many are foreseen that it is better off alone."""
+    """Whether the steps of a lane have become too short, or so many are foreseen that it is better off alone.
+
+    A variant that will take more than 100 000 up to the end is stiff, or swings that often.
+    """
     t, count = now[tables.rows.time, lane], now[tables.rows.made, lane]
     gone = t - now[tables.rows.begun, lane]
-    slow = count > 4 * LANES and count * (gone + end - t) > MOST_STEPS * gone
+    slow = count > 4 * LANES and count * (gone + end - t) > 100_000 * gone
     return slow or (count > 0 and not now[tables.rows.step, lane] > 8 * EPS * abs(t))
 
 

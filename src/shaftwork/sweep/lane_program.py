@@ -27,8 +27,6 @@ from shaftwork.sweep.lane_tables import LaneCourse, LaneRows, LaneTables
 
 OF_A_STEP, LOOSEST_TOLERANCE, TIGHTEST_TOLERANCE = 0.1, 1e-7, 1e-13
 """The tolerance of a step as a part of that of the motion, and its bounds."""
-KEPT = 64
-"""Programs that are kept."""
 
 
 class LaneProgram:
@@ -174,7 +172,7 @@ def lane_program(
     return _programs(key, lambda: LaneProgram(rows, guards, quantities, kinds, stored))
 
 
-_programs = BoundedCache[tuple[object, ...], LaneProgram](KEPT)
+_programs = BoundedCache[tuple[object, ...], LaneProgram](64)
 
 
 class _Derivatives:

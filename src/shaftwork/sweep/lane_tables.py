@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from enum import IntEnum
 from typing import NamedTuple
 
 from shaftwork.codegen.array_form.elements import Array, Index
 
-NOTHING, THE_END, A_LIMIT = -1, -2, -3
-"""What a lane has met where that is no guard: nothing, the end, or what it cannot pass."""
+
+class Met(IntEnum):
+    """What a lane has met where that is no guard: nothing, the end, or what it cannot pass."""
+
+    NOTHING = -1
+    THE_END = -2
+    A_LIMIT = -3
 
 
 class LaneRows(NamedTuple):
