@@ -211,7 +211,6 @@ class ModeEquations:
         """What is the same in all phases of these modes; the rest is empty."""
         bound, clocks, size = partial(self.bound, p), self.clocks, len(self.model.states)
         guards, none = self.guards(p), np.empty(0)
-        values = guards if not clocks else lambda t, y: guards(t, y[:, :size])
         return Problem(
             rhs=self.right_side(p),
             jacobian=self.slopes(bound) if size else None,
@@ -221,7 +220,7 @@ class ModeEquations:
             t_end=0.0,
             names=(*self.model.states, *(f"limit of {self.machines[self._owners[k]].name}" for k in clocks)),
             atol=self.prepared(p).atol,
-            guards=Guards(values, self.sides(modes), none, none),
+            guards=Guards(guards if not clocks else lambda t, y: guards(t, y[:, :size]), self.sides(modes), none, none),
             switches=(lambda t, y: bound().switches(t, y[:, :size])) if self.model.arrays.inputs.switching else None,
             symbolic=cache(lambda: None if self.program is None else self.program.bind(self.values(p))),
             compiled=cache(lambda: self._machine(p)),
