@@ -13,7 +13,7 @@ JET = 3
 BEYOND = 0.2
 """Of the difference between the cubic and the quintic in the middle of an interval: so far the motion may be from the
 quintic. Of a sine, whose samples are less than half a period apart, it is at most half of that."""
-_compiled = njit(error_model="numpy", cache=True)
+_compiled = njit(error_model="numpy")
 
 
 @_compiled

@@ -18,9 +18,9 @@ from shaftwork.codegen.array_form.elements import Array, Index
 from shaftwork.numerics.hermite import JET, peak, powers, reach, root
 from shaftwork.numerics.machine_code import LANES, run_at
 from shaftwork.numerics.tolerances import EPS, ROUNDINGS, TYPED
-from shaftwork.sweep.lane_tables import Met
+from shaftwork.sweep.lane_tables import LaneCourse, LaneTables, Met, Row
 
-_compiled = njit(error_model="numpy", cache=True)
+_compiled = njit(error_model="numpy")
 
 
 class _Lanes(NamedTuple):
@@ -40,14 +40,21 @@ class _Lanes(NamedTuple):
 
 
 @_compiled
+def _fill(memory, row, value):  # type: ignore[no-untyped-def]
+    """Write a number for all lanes; numba takes a second to compile an assignment to a row."""
+    for lane in range(LANES):
+        memory[row, lane] = value
+
+
+@_compiled
 def _look(tables, memory):  # type: ignore[no-untyped-def]
     """See what there is at the start of a step, and write the first slopes."""
     for lane in range(LANES):
         for row in range(tables.moving):
-            memory[tables.rows.y + row, lane] = memory[tables.rows.x + row, lane]
-        memory[tables.rows.moment, lane] = min(memory[tables.rows.time, lane], memory[tables.rows.high, lane])
-    run_at(tables.jets, memory, tables.rows.sight)
-    run_at(tables.rates, memory, tables.rows.slopes)
+            memory[tables.first[Row.Y] + row, lane] = memory[tables.first[Row.X] + row, lane]
+        memory[Row.MOMENT, lane] = min(memory[Row.TIME, lane], memory[Row.HIGH, lane])
+    run_at(tables.jets, memory, tables.first[Row.SIGHT])
+    run_at(tables.rates, memory, tables.first[Row.SLOPES])
 
 
 @_compiled
@@ -59,24 +66,25 @@ def _jet(memory, row, sign, offset, lane):  # type: ignore[no-untyped-def]
 @_compiled
 def _repeat(tables, lanes, lane):  # type: ignore[no-untyped-def]
     """Let all lanes of the probe start where the last step of one did."""
-    probe = lanes.probe
-    for row in range(tables.rows.height):
-        probe[row] = lanes.now[row, lane]
+    probe, now, first = lanes.probe, lanes.now, tables.first
+    for row in range(first[Row.HEIGHT]):
+        _fill(probe, row, now[row, lane])
     for row in range(tables.moving):
-        probe[tables.rows.x + row] = lanes.now[tables.rows.last_x + row, lane]
-    probe[tables.rows.time] = lanes.now[tables.rows.last_time, lane]
+        _fill(probe, first[Row.X] + row, now[first[Row.LAST_X] + row, lane])
+    _fill(probe, Row.TIME, now[Row.LAST_TIME, lane])
     _look(tables, probe)
 
 
 @_compiled
 def _probe(tables, probe, t):  # type: ignore[no-untyped-def]
     """Follow the lane in a probe up to a time in s, and see what is there."""
-    probe[tables.rows.size] = t - probe[tables.rows.time, 0]
+    first = tables.first
+    _fill(probe, Row.SIZE, t - probe[Row.TIME, 0])
     run_at(tables.probe, probe, 0)
     for row in range(tables.moving):
-        probe[tables.rows.y + row] = probe[tables.rows.new + row]
-    probe[tables.rows.moment] = min(t, probe[tables.rows.high, 0])
-    run_at(tables.jets, probe, tables.rows.sight)
+        _fill(probe, first[Row.Y] + row, probe[first[Row.NEW] + row, 0])
+    _fill(probe, Row.MOMENT, min(t, probe[Row.HIGH, 0]))
+    run_at(tables.jets, probe, first[Row.SIGHT])
 
 
 @_compiled
@@ -106,8 +114,8 @@ def _put(stack, row, low, left, high, right, missed, room):  # type: ignore[no-u
 
 
 @_compiled
-def _top(tables, lanes, row, sign, offset, best, near, first):  # type: ignore[no-untyped-def]
-    """The largest value in the interval that is on the stack, and when; with `first`, the first seen above zero.
+def _top(tables, lanes, row, sign, offset, best, near, enough):  # type: ignore[no-untyped-def]
+    """The largest value in the interval that is on the stack, and when; or the first that is seen above `enough`.
 
     NaN where no peak can be told.
     """
@@ -127,7 +135,7 @@ def _top(tables, lanes, row, sign, offset, best, near, first):  # type: ignore[n
         # what a polynomial misses grows with the cube of the distance from a point that it goes through
         part = min(t - low, high - t) / room if room > 0 else 1.0
         if part < 0.01 and missed * part**3 < near:
-            best = best if first else max(best, height)
+            best = max(best, height) if enough == np.inf else best
             continue
         if looks > 60 or count + 2 > len(stack):
             return np.nan, when
@@ -136,7 +144,7 @@ def _top(tables, lanes, row, sign, offset, best, near, first):  # type: ignore[n
         middle = _jet(probe, row, sign, offset, 0)
         if middle[0] > best:
             best, when = middle[0], t
-            if first:
+            if best > enough:
                 return best, when
         missed, room = abs(height - middle[0]), min(t - low, high - t)
         _put(stack, count, low, left, t, middle, missed, room)
@@ -149,24 +157,24 @@ def _top(tables, lanes, row, sign, offset, best, near, first):  # type: ignore[n
 def _first_met(tables, lanes, lane):  # type: ignore[no-untyped-def]
     """The guard that is met first in the last step of a lane, and when in s; Met.NOTHING where none is."""
     now, met, extremes = lanes.now, Met.NOTHING.value, tables.extremes.shape[0]
-    low, high = now[tables.rows.last_time, lane], now[tables.rows.time, lane]
+    low, high = now[Row.LAST_TIME, lane], now[Row.TIME, lane]
     end = high
     for guard in range(tables.guards):
         side, offset, number = (
-            now[tables.rows.sides + guard, lane],
-            now[tables.rows.offsets + guard, lane],
+            now[tables.first[Row.SIDES] + guard, lane],
+            now[tables.first[Row.OFFSETS] + guard, lane],
             extremes + guard,
         )
-        left = _jet(now, tables.rows.last_sight + JET * number, side, offset, lane)
-        right = _jet(now, tables.rows.sight + JET * number, side, offset, lane)
+        left = _jet(now, tables.first[Row.LAST_SIGHT] + JET * number, side, offset, lane)
+        right = _jet(now, tables.first[Row.SIGHT] + JET * number, side, offset, lane)
         inside, beyond = reach(high - low, left, right)
         if side == 0.0 or (right[0] <= 0 and inside + beyond <= 0):
             continue
-        upper, value, row = high, right[0], tables.rows.sight + JET * number
+        upper, value, row = high, right[0], tables.first[Row.SIGHT] + JET * number
         if value <= 0:
             _put(lanes.stack, 0, low, left, high, right, 0.0, 0.0)
             near = TYPED * max(abs(left[0]), abs(right[0]))
-            value, upper = _top(tables, lanes, row, side, offset, 0.0, near, 1)
+            value, upper = _top(tables, lanes, row, side, offset, 0.0, near, 0.0)
         if not value > 0:
             continue
         share = (upper - low) / (high - low)
@@ -180,62 +188,64 @@ def _first_met(tables, lanes, lane):  # type: ignore[no-untyped-def]
 @_compiled
 def _past(tables, probe, end):  # type: ignore[no-untyped-def]
     """A time in s just past that of a probe, up to which no state moves by more than a hundredth of its tolerance."""
-    longest, tolerance = np.inf, probe[tables.rows.tolerance, 0]
+    longest, tolerance = np.inf, probe[Row.TOLERANCE, 0]
     for row in range(tables.states):
-        x = probe[tables.rows.new + row, 0]
-        rate = (x - probe[tables.rows.x + row, 0]) / probe[tables.rows.size, 0]
+        x = probe[tables.first[Row.NEW] + row, 0]
+        rate = (x - probe[tables.first[Row.X] + row, 0]) / probe[Row.SIZE, 0]
         if rate != 0.0:
-            longest = min(longest, 0.01 * tolerance * (probe[tables.rows.nominal + row, 0] + abs(x)) / abs(rate))
-    return min(end, probe[tables.rows.moment, 0] + longest)
+            longest = min(longest, 0.01 * tolerance * (probe[tables.first[Row.NOMINAL] + row, 0] + abs(x)) / abs(rate))
+    return min(end, probe[Row.MOMENT, 0] + longest)
 
 
 @_compiled
-def _measure(tables, lanes, seen, lane, there, end):  # type: ignore[no-untyped-def]
+def _measure(tables, lanes, seen, lane, end):  # type: ignore[no-untyped-def]
     """Take the inside of the last step of a lane into the extremes, up to a time in s and what is seen there."""
     now = lanes.now
-    low = now[tables.rows.last_time, lane]
+    low = now[Row.LAST_TIME, lane]
     for k in range(tables.extremes.shape[0]):
         number, sign = JET * tables.extremes[k, 0], tables.signs[k]
-        left = _jet(now, tables.rows.last_sight + number, sign, 0.0, lane)
-        right = _jet(seen, tables.rows.sight + number, sign, 0.0, there)
-        best = max(now[tables.rows.best + k, lane], left[0], right[0])
-        lowest = min(now[tables.rows.lows + k, lane], left[0], right[0])
+        left = _jet(now, tables.first[Row.LAST_SIGHT] + number, sign, 0.0, lane)
+        right = _jet(seen, tables.first[Row.SIGHT] + number, sign, 0.0, lane)
+        best = max(now[tables.first[Row.BEST] + k, lane], left[0], right[0])
+        lowest = min(now[tables.first[Row.LOWS] + k, lane], left[0], right[0])
         _put(lanes.stack, 0, low, left, end, right, 0.0, 0.0)
-        best, _ = _top(tables, lanes, tables.rows.sight + number, sign, 0.0, best, TYPED * (best - lowest), 0)
-        now[tables.rows.best + k, lane], now[tables.rows.lows + k, lane] = best, lowest
+        best, _ = _top(
+            tables, lanes, tables.first[Row.SIGHT] + number, sign, 0.0, best, TYPED * (best - lowest), np.inf
+        )
+        now[tables.first[Row.BEST] + k, lane], now[tables.first[Row.LOWS] + k, lane] = best, lowest
 
 
 @_compiled
 def _load(tables, course, lanes, lane, variant):  # type: ignore[no-untyped-def]
     """Let a variant begin in a lane."""
     now = lanes.now
-    now[tables.rows.time, lane], now[tables.rows.begun, lane] = course.t[variant], course.t[variant]
-    now[tables.rows.high, lane], now[tables.rows.end, lane] = course.highs[variant], course.ends[variant]
-    now[tables.rows.active, lane], now[tables.rows.step, lane], now[tables.rows.made, lane] = 1.0, -1.0, 0.0
+    now[Row.TIME, lane], now[Row.BEGUN, lane] = course.t[variant], course.t[variant]
+    now[Row.HIGH, lane], now[Row.END, lane] = course.highs[variant], course.ends[variant]
+    now[Row.ACTIVE, lane], now[Row.STEP, lane], now[Row.MADE, lane] = 1.0, -1.0, 0.0
     for row in range(tables.moving):
-        now[tables.rows.x + row, lane] = course.x[row, variant] if row < tables.states else 0.0
+        now[tables.first[Row.X] + row, lane] = course.x[row, variant] if row < tables.states else 0.0
     for row in range(course.p.shape[0]):
-        now[tables.rows.p + row, lane] = course.p[row, variant]
+        now[tables.first[Row.P] + row, lane] = course.p[row, variant]
     for guard in range(tables.guards):
-        now[tables.rows.sides + guard, lane] = course.sides[guard, variant]
-        now[tables.rows.offsets + guard, lane] = course.offsets[guard, variant]
+        now[tables.first[Row.SIDES] + guard, lane] = course.sides[guard, variant]
+        now[tables.first[Row.OFFSETS] + guard, lane] = course.offsets[guard, variant]
     for k in range(tables.extremes.shape[0]):
-        now[tables.rows.best + k, lane] = course.best[tables.extremes[k, 1], variant]
-        now[tables.rows.lows + k, lane] = np.inf
+        now[tables.first[Row.BEST] + k, lane] = course.best[tables.extremes[k, 1], variant]
+        now[tables.first[Row.LOWS] + k, lane] = np.inf
 
 
 @_compiled
-def _leave(tables, course, lanes, memory, x, lane, there, t, met):  # type: ignore[no-untyped-def]
+def _leave(tables, course, lanes, memory, x, lane, t, met):  # type: ignore[no-untyped-def]
     """Write where a variant has come to in a lane, from the row where its states stand, and what it has met."""
     variant = lanes.variants[lane]
-    course.met[variant], course.t[variant], course.steps[variant] = met, t, lanes.now[tables.rows.size, lane]
+    course.met[variant], course.t[variant], course.steps[variant] = met, t, lanes.now[Row.SIZE, lane]
     for row in range(tables.moving):
         if row < tables.states:
-            course.x[row, variant] = memory[x + row, there]
+            course.x[row, variant] = memory[x + row, lane]
         else:
-            course.integrals[row - tables.states, variant] += memory[x + row, there]
+            course.integrals[row - tables.states, variant] += memory[x + row, lane]
     for k in range(tables.extremes.shape[0]):
-        row, best = tables.extremes[k, 1], lanes.now[tables.rows.best + k, lane]
+        row, best = tables.extremes[k, 1], lanes.now[tables.first[Row.BEST] + k, lane]
         course.best[row, variant] = best if np.isnan(best) else max(course.best[row, variant], best)
 
 
@@ -247,16 +257,16 @@ def _begin(tables, lanes, lane, last):  # type: ignore[no-untyped-def]
     """
     now, step = lanes.now, np.inf
     for row in range(tables.states):
-        x, rate = now[tables.rows.x + row, lane], now[tables.rows.slopes + row, lane]
+        x, rate = now[tables.first[Row.X] + row, lane], now[tables.first[Row.SLOPES] + row, lane]
         if rate != 0.0:
-            step = min(step, 0.01 * (now[tables.rows.nominal + row, lane] + abs(x)) / abs(rate))
-    now[tables.rows.step, lane] = max(step, last)
+            step = min(step, 0.01 * (now[tables.first[Row.NOMINAL] + row, lane] + abs(x)) / abs(rate))
+    now[Row.STEP, lane] = max(step, last)
     for guard in range(tables.guards - tables.free, tables.guards):
-        now[tables.rows.sides + guard, lane] = 0.0
-        row = tables.rows.sight + JET * (tables.extremes.shape[0] + guard)
+        now[tables.first[Row.SIDES] + guard, lane] = 0.0
+        row = tables.first[Row.SIGHT] + JET * (tables.extremes.shape[0] + guard)
         for value in _jet(now, row, 1.0, 0.0, lane):
             if value != 0.0:
-                now[tables.rows.sides + guard, lane] = -np.sign(value)
+                now[tables.first[Row.SIDES] + guard, lane] = -np.sign(value)
                 break
 
 
@@ -264,80 +274,88 @@ def _begin(tables, lanes, lane, last):  # type: ignore[no-untyped-def]
 def _arrived(tables, course, lanes, lane):  # type: ignore[no-untyped-def]
     """Whether a lane is done: it has met a guard in its last step, or is at its end."""
     now, met = lanes.now, Met.NOTHING.value
-    end, last, close = now[tables.rows.time, lane], now[tables.rows.end, lane], now[tables.rows.close, lane] > 0
+    end, last, close = now[Row.TIME, lane], now[Row.END, lane], now[Row.CLOSE, lane] > 0
     if close:
         _repeat(tables, lanes, lane)
         met, end = _first_met(tables, lanes, lane)
     if met == Met.NOTHING.value:
         if close:
-            _measure(tables, lanes, now, lane, lane, end)
+            _measure(tables, lanes, now, lane, end)
         if end >= last:
-            _leave(tables, course, lanes, now, tables.rows.x, lane, lane, end, Met.THE_END.value)
+            _leave(tables, course, lanes, now, tables.first[Row.X], lane, end, Met.THE_END.value)
         return end >= last
     _probe(tables, lanes.probe, end)
     if met >= tables.guards - tables.free:
         end = _past(tables, lanes.probe, last)
         _probe(tables, lanes.probe, end)
     there = lanes.probe.copy()
-    _measure(tables, lanes, there, lane, 0, end)
-    _leave(tables, course, lanes, there, tables.rows.new, lane, 0, end, met)
+    _measure(tables, lanes, there, lane, end)
+    _leave(tables, course, lanes, there, tables.first[Row.NEW], lane, end, met)
     return True
 
 
 @_compiled
-def _hopeless(tables, now, lane, end):  # type: ignore[no-untyped-def]
+def _hopeless(now, lane, end):  # type: ignore[no-untyped-def]
     """Whether the steps of a lane have become too short, or so many are foreseen that it is better off alone.
 
     A variant that will take more than 100 000 up to the end is stiff, or swings that often.
     """
-    t, count = now[tables.rows.time, lane], now[tables.rows.made, lane]
-    gone = t - now[tables.rows.begun, lane]
+    t, count = now[Row.TIME, lane], now[Row.MADE, lane]
+    gone = t - now[Row.BEGUN, lane]
     slow = count > 4 * LANES and count * (gone + end - t) > 100_000 * gone
-    return slow or (count > 0 and not now[tables.rows.step, lane] > 8 * EPS * abs(t))
+    return slow or (count > 0 and not now[Row.STEP, lane] > 8 * EPS * abs(t))
 
 
-@_compiled
-def follow(tables, course, nominal, limits):  # type: ignore[no-untyped-def]
+@njit(error_model="numpy", cache=True)
+def follow(  # type: ignore[no-untyped-def]
+    rates, jets, probe, advance, compare, first, states, moving, guards, free, extremes, signs,
+    t, x, p, ends, highs, sides, offsets, integrals, best, steps, met, nominal, limits,
+):  # fmt: skip
     """Follow all variants of a course up to a guard, their end or a limit.
 
+    All are plain arrays and numbers: numba keeps what it compiles by their kinds, from one version to the next.
+
     Args:
-        tables: `LaneTables`.
-        course: `LaneCourse`.
+        rates, jets, probe, advance, compare, first, states, moving, guards, free, extremes, signs: `LaneTables`.
+        t, x, p, ends, highs, sides, offsets, integrals, best, steps, met: `LaneCourse`.
         nominal: (n,) sizes of the states.
         limits: (3,) the tolerance of a step, the longest step and the end of the motion, s.
     """
+    tables = LaneTables(rates, jets, probe, advance, compare, first, states, moving, guards, free, extremes, signs)
+    course = LaneCourse(t, x, p, ends, highs, sides, offsets, integrals, best, steps, met)
     lanes = _Lanes(
-        np.zeros((tables.rows.height, LANES)),
-        np.zeros((tables.rows.height, LANES)),
+        np.zeros((tables.first[Row.HEIGHT], LANES)),
+        np.zeros((tables.first[Row.HEIGHT], LANES)),
         np.zeros((LANES * JET, 10)),
         np.full(LANES, -1),
     )
-    now, variants, following, busy = lanes.now, lanes.variants, 0, True
-    now[tables.rows.tolerance], now[tables.rows.longest] = limits[0], limits[1]
+    now, variants, waiting, busy = lanes.now, lanes.variants, course.t.size, True
+    _fill(now, Row.TOLERANCE, limits[0])
+    _fill(now, Row.LONGEST, limits[1])
     for row in range(tables.states):
-        now[tables.rows.nominal + row] = nominal[row]
+        _fill(now, tables.first[Row.NOMINAL] + row, nominal[row])
     while busy:
         _look(tables, now)
         run_at(tables.compare, now, 0)
         busy, loaded = False, False
         for lane in range(LANES):
             variant = variants[lane]
-            to_see = now[tables.rows.close, lane] > 0 or now[tables.rows.time, lane] >= now[tables.rows.end, lane]
-            if now[tables.rows.moved, lane] > 0 and to_see:
+            to_see = now[Row.CLOSE, lane] > 0 or now[Row.TIME, lane] >= now[Row.END, lane]
+            if now[Row.MOVED, lane] > 0 and to_see:
                 if _arrived(tables, course, lanes, lane):
                     variant = -1
-            elif variant >= 0 and _hopeless(tables, now, lane, limits[2]):
+            elif variant >= 0 and _hopeless(now, lane, limits[2]):
                 variant = -1
-            if variant < 0 and following < course.t.size:
-                variant, following, loaded = following, following + 1, True
+            if variant < 0 and waiting:
+                variant, waiting, loaded = course.t.size - waiting, waiting - 1, True
                 _load(tables, course, lanes, lane, variant)
             elif variant < 0:
-                now[tables.rows.active, lane] = 0.0
+                now[Row.ACTIVE, lane] = 0.0
             variants[lane] = variant
             busy = busy or variant >= 0
         if loaded:
             _look(tables, now)
             for lane in range(LANES):
-                if now[tables.rows.step, lane] < 0:
+                if now[Row.STEP, lane] < 0:
                     _begin(tables, lanes, lane, course.steps[variants[lane]])
         run_at(tables.advance, now, 0)

@@ -10,7 +10,7 @@ from numba import njit
 from numba.core.errors import NumbaError
 from sympy import Add, Dummy, Expr
 
-from shaftwork.codegen.array_form.elements import Array
+from shaftwork.codegen.array_form.elements import Array, Index
 from shaftwork.codegen.machine_program import Terms, jumping
 from shaftwork.codegen.taylor.heyoka_parameters import Fixed
 from shaftwork.components.law_slopes import slope
@@ -23,7 +23,7 @@ from shaftwork.numerics.machine_code import LANES, LaneBody, lane_function, run_
 from shaftwork.results.measures import EXTREMES, POWERS
 from shaftwork.sweep.lane_loops import follow
 from shaftwork.sweep.lane_step import STAGES, Judged, StepWriter
-from shaftwork.sweep.lane_tables import LaneCourse, LaneRows, LaneTables
+from shaftwork.sweep.lane_tables import LaneCourse, LaneTables, Row
 
 OF_A_STEP, LOOSEST_TOLERANCE, TIGHTEST_TOLERANCE = 0.1, 1e-7, 1e-13
 """The tolerance of a step as a part of that of the motion, and its bounds."""
@@ -64,19 +64,19 @@ class LaneProgram:
         self.integrated = [k for k, kind in enumerate(kinds) if kind in POWERS]
         """Which measures are integrals."""
         place = seen.rows(len(rows.parameters) + len(self._fixed.places))
-        write = partial(lane_function, rows=place._asdict())
+        write = partial(lane_function, rows={row.name.lower(): int(place[row]) for row in Row})
         try:
             rates, jets, self._points = (
                 write(partial(self._write, values=values, definitions=definitions))
                 for values, definitions in ((seen.slopes, {}), (seen.sight, seen.motion.definitions), (points, {}))
             )
-            steps = seen.steps(rates.address, place.slopes)
+            steps = seen.steps(rates.address, int(place[Row.SLOPES]))
             self._code = rates, jets, *map(write, (steps.probe, steps.advance, steps.compare))
         except NumbaError as error:
             raise CompileError(f"A law has no machine code: {error}") from error
         addresses = {name: code.address for name, code in zip(LaneTables._fields, self._code, strict=False)}
         self._tables = LaneTables(
-            **addresses, rows=place, states=len(rows.states), moving=seen.moving, guards=self.guards + self.free,
+            **addresses, first=place, states=len(rows.states), moving=seen.moving, guards=self.guards + self.free,
             free=self.free, extremes=np.array([*enumerate(k for k, _ in seen.signs)], dtype=np.int64).reshape(-1, 2),
             signs=np.array([sign for _, sign in seen.signs]),
         )  # fmt: skip
@@ -102,7 +102,7 @@ class LaneProgram:
             span: start and end of the motion, s.
         """
         tolerance = min(max(OF_A_STEP * rtol, TIGHTEST_TOLERANCE), LOOSEST_TOLERANCE)
-        follow(self._tables, course, sizes, np.array([tolerance, (span[1] - span[0]) / 50, span[1]]))
+        follow(*self._tables, *course, sizes, np.array([tolerance, (span[1] - span[0]) / 50, span[1]]))
 
     def points(self, t: Array, x: Array, p: Array) -> dict[str, Array]:
         """Rates, guards, what is shown and what is stored, (values, k) each, of k variants.
@@ -114,7 +114,7 @@ class LaneProgram:
         """
         counts = [len(part) for part in self._parts.values()]
         values, tables = np.empty((sum(counts), t.size)), self._tables
-        _evaluate(self._points.address, tables.rows, t, x, p, values)
+        _evaluate(self._points.address, tables.first, t, np.ascontiguousarray(x), np.ascontiguousarray(p), values)
         return dict(zip(self._parts, np.split(values, np.cumsum(counts)[:-1]), strict=True))
 
 
@@ -152,7 +152,7 @@ class _Seen:
             self._watched,
         )  # fmt: skip
 
-    def rows(self, parameters: int) -> LaneRows:
+    def rows(self, parameters: int) -> Index:
         """Where all arrays stand, one behind the other, with so many parameters; the others have one row."""
         states, moving, slopes, extremes, watched = (
             self._states, self.moving, len(self.slopes), len(self.signs), self._watched,
@@ -161,7 +161,7 @@ class _Seen:
         sizes |= {"slopes": STAGES * slopes, "fifth": slopes, "third": slopes, "fifths": states, "thirds": states}
         sizes |= {"sight": len(self.sight), "last_sight": JET * (extremes + watched), "best": extremes}
         sizes |= {"lows": extremes, "sides": watched, "offsets": watched, "p": parameters}
-        return LaneRows(*np.cumsum([0, *(sizes.get(name, 1) for name in LaneRows._fields[:-1])]).tolist())
+        return np.cumsum([0, *(sizes.get(row.name.lower(), 1) for row in Row if row is not Row.HEIGHT)])
 
 
 def lane_program(
@@ -209,18 +209,18 @@ class _Derivatives:
 
 
 @njit(error_model="numpy", cache=True)
-def _evaluate(function, rows, t, x, p, values):  # type: ignore[no-untyped-def]
+def _evaluate(function, first, t, x, p, values):  # type: ignore[no-untyped-def]
     """Write the values (rows, k) of a function at times (k,), states (n, k) and parameters (parameters, k)."""
-    memory = np.zeros((rows.height + values.shape[0], LANES))
+    memory = np.zeros((first[Row.HEIGHT] + values.shape[0], LANES))
     for start in range(0, t.size, LANES):
         for lane in range(LANES):
             variant = min(start + lane, t.size - 1)
-            memory[rows.moment, lane] = t[variant]
+            memory[Row.MOMENT, lane] = t[variant]
             for row in range(x.shape[0]):
-                memory[rows.y + row, lane] = x[row, variant]
+                memory[first[Row.Y] + row, lane] = x[row, variant]
             for row in range(p.shape[0]):
-                memory[rows.p + row, lane] = p[row, variant]
-        run_at(function, memory, rows.height)
+                memory[first[Row.P] + row, lane] = p[row, variant]
+        run_at(function, memory, first[Row.HEIGHT])
         for lane in range(min(LANES, t.size - start)):
             for row in range(values.shape[0]):
-                values[row, start + lane] = memory[rows.height + row, lane]
+                values[row, start + lane] = memory[first[Row.HEIGHT] + row, lane]

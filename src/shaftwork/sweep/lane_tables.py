@@ -16,76 +16,73 @@ class Met(IntEnum):
     A_LIMIT = -3
 
 
-class LaneRows(NamedTuple):
-    """The first row of each array in the memory of a block of lanes.
+class Row(IntEnum):
+    """What stands in the memory of a block of lanes: what has one row, of which this is the number, and then arrays."""
 
-    Args:
-        nominal: nominal sizes of the states.
-        tolerance: of a step.
-        longest: a step at most, s.
-        time: at the start of a step, s.
-        size: length of a step, s.
-        high: the latest time at which anything is evaluated, s.
-        moment: time at which slopes and sights are, s.
-        end: up to which a lane goes, s.
-        step: length of the next step, s.
-        active: 1 where a lane is on its way.
-        moved: 1 where its last step was good.
-        close: 1 where more than the ends of that is to be looked at.
-        made: how many steps were tried.
-        last_time: at the start of the last good step, s.
-        begun: time at which the lane began, s.
-        x: states and integrals at the start of a step.
-        y: the same at the moment.
-        new: the same at the end.
-        last_x: the same at the start of the last good step.
-        slopes: of states, integrals and what is blind, stage by stage.
-        fifth: what a method of order 5 misses of all slopes.
-        third: the same by one of order 3.
-        fifths: squares of that over what is allowed, of the states.
-        thirds: the same by order 3.
-        sight: jets of what is seen, and values and gradients of what is judged.
-        last_sight: jets at the start of the last good step.
-        best: largest values so far, of extremes,
-        lows: and the lowest.
-        sides: on which guards are met; 0 where one is not watched.
-        offsets: how far beyond zero they have to go.
-        p: parameters.
-        height: rows in all.
-    """
-
-    nominal: int
-    tolerance: int
-    longest: int
-    time: int
-    size: int
-    high: int
-    moment: int
-    end: int
-    step: int
-    active: int
-    moved: int
-    close: int
-    made: int
-    last_time: int
-    begun: int
-    x: int
-    y: int
-    new: int
-    last_x: int
-    slopes: int
-    fifth: int
-    third: int
-    fifths: int
-    thirds: int
-    sight: int
-    last_sight: int
-    best: int
-    lows: int
-    sides: int
-    offsets: int
-    p: int
-    height: int
+    TOLERANCE = 0
+    """Of a step."""
+    LONGEST = 1
+    """A step at most, s."""
+    TIME = 2
+    """At the start of a step, s."""
+    SIZE = 3
+    """Length of a step, s."""
+    HIGH = 4
+    """The latest time at which anything is evaluated, s."""
+    MOMENT = 5
+    """Time at which slopes and sights are, s."""
+    END = 6
+    """Up to which a lane goes, s."""
+    STEP = 7
+    """Length of the next step, s."""
+    ACTIVE = 8
+    """1 where a lane is on its way."""
+    MOVED = 9
+    """1 where its last step was good."""
+    CLOSE = 10
+    """1 where more than the ends of that is to be looked at."""
+    MADE = 11
+    """How many steps were tried."""
+    LAST_TIME = 12
+    """At the start of the last good step, s."""
+    BEGUN = 13
+    """Time at which the lane began, s."""
+    NOMINAL = 14
+    """Nominal sizes of the states."""
+    X = 15
+    """States and integrals at the start of a step."""
+    Y = 16
+    """The same at the moment."""
+    NEW = 17
+    """The same at the end."""
+    LAST_X = 18
+    """The same at the start of the last good step."""
+    SLOPES = 19
+    """Of states, integrals and what is blind, stage by stage."""
+    FIFTH = 20
+    """What a method of order 5 misses of all slopes."""
+    THIRD = 21
+    """The same by one of order 3."""
+    FIFTHS = 22
+    """Squares of that over what is allowed, of the states."""
+    THIRDS = 23
+    """The same by order 3."""
+    SIGHT = 24
+    """Jets of what is seen, and values and gradients of what is judged."""
+    LAST_SIGHT = 25
+    """Jets at the start of the last good step."""
+    BEST = 26
+    """Largest values so far, of extremes."""
+    LOWS = 27
+    """And the lowest."""
+    SIDES = 28
+    """On which guards are met; 0 where one is not watched."""
+    OFFSETS = 29
+    """How far beyond zero they have to go."""
+    P = 30
+    """Parameters."""
+    HEIGHT = 31
+    """Behind all of them."""
 
 
 class LaneTables(NamedTuple):
@@ -97,7 +94,7 @@ class LaneTables(NamedTuple):
         probe: makes a step of a given size.
         advance: makes a step that is as long as the tolerance lets it be.
         compare: looks at the ends of the last step.
-        rows: the memory.
+        first: (Row.HEIGHT + 1,) the first row of each array.
         states: how many; integrals follow them,
         moving: and so many are both.
         guards: how many of those seen are guards and switches; they come last.
@@ -111,7 +108,7 @@ class LaneTables(NamedTuple):
     probe: int
     advance: int
     compare: int
-    rows: LaneRows
+    first: Index
     states: int
     moving: int
     guards: int
