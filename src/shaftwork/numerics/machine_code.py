@@ -26,6 +26,21 @@ _quantile = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double, ctypes.c_int)(
 )
 
 
+def compiled(*signature: Any) -> Callable[[Any], Any]:
+    """Compile a function, and keep it for other processes where there is a folder for it."""
+
+    def decorate(function: Any) -> Any:
+        try:
+            return njit(*signature, error_model="numpy", cache=True)(function)
+        except RuntimeError:  # no folder can be written
+            return njit(*signature, error_model="numpy")(function)
+
+    return decorate
+
+
+inner = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, no_rewrites=True)  # type: ignore[call-overload]
+"""Compile a function that compiled ones alone call, without what would let Python call it."""
+
 _written: Any = intrinsic
 """Functions of which this file writes the machine code itself."""
 

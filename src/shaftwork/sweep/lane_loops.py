@@ -12,15 +12,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from shaftwork.codegen.array_form.elements import Array, Index
 from shaftwork.numerics.hermite import JET, peak, powers, reach, root
-from shaftwork.numerics.machine_code import LANES, run_at
+from shaftwork.numerics.machine_code import LANES, compiled, inner, run_at
 from shaftwork.numerics.tolerances import EPS, ROUNDINGS, TYPED
 from shaftwork.sweep.lane_tables import LaneCourse, LaneTables, Met, Row
-
-_compiled = njit(error_model="numpy")
 
 
 class _Lanes(NamedTuple):
@@ -39,14 +36,14 @@ class _Lanes(NamedTuple):
     variants: Index
 
 
-@_compiled
+@inner
 def _fill(memory, row, value):  # type: ignore[no-untyped-def]
     """Write a number for all lanes; numba takes a second to compile an assignment to a row."""
     for lane in range(LANES):
         memory[row, lane] = value
 
 
-@_compiled
+@inner
 def _look(tables, memory):  # type: ignore[no-untyped-def]
     """See what there is at the start of a step, and write the first slopes."""
     for lane in range(LANES):
@@ -57,13 +54,13 @@ def _look(tables, memory):  # type: ignore[no-untyped-def]
     run_at(tables.rates, memory, tables.first[Row.SLOPES])
 
 
-@_compiled
+@inner
 def _jet(memory, row, sign, offset, lane):  # type: ignore[no-untyped-def]
     """A value and its derivatives of one lane, times a sign and less an offset."""
     return sign * memory[row, lane] - offset, sign * memory[row + 1, lane], sign * memory[row + 2, lane]
 
 
-@_compiled
+@inner
 def _repeat(tables, lanes, lane):  # type: ignore[no-untyped-def]
     """Let all lanes of the probe start where the last step of one did."""
     probe, now, first = lanes.probe, lanes.now, tables.first
@@ -75,7 +72,7 @@ def _repeat(tables, lanes, lane):  # type: ignore[no-untyped-def]
     _look(tables, probe)
 
 
-@_compiled
+@inner
 def _probe(tables, probe, t):  # type: ignore[no-untyped-def]
     """Follow the lane in a probe up to a time in s, and see what is there."""
     first = tables.first
@@ -87,7 +84,7 @@ def _probe(tables, probe, t):  # type: ignore[no-untyped-def]
     run_at(tables.jets, probe, first[Row.SIGHT])
 
 
-@_compiled
+@inner
 def _rise(tables, probe, row, sign, offset, low, high, there):  # type: ignore[no-untyped-def]
     """The time in s of a rise through zero between two times, with the first guess for it."""
     nothing = 2 * EPS * (abs(high) + ROUNDINGS * (high - low))
@@ -104,7 +101,7 @@ def _rise(tables, probe, row, sign, offset, low, high, there):  # type: ignore[n
     return there
 
 
-@_compiled
+@inner
 def _put(stack, row, low, left, high, right, missed, room):  # type: ignore[no-untyped-def]
     """An interval: time and jet at both ends, how much the quintic was off at one of them, and how near that was."""
     interval = stack[row]
@@ -113,7 +110,7 @@ def _put(stack, row, low, left, high, right, missed, room):  # type: ignore[no-u
     interval[8], interval[9] = missed, room
 
 
-@_compiled
+@inner
 def _top(tables, lanes, row, sign, offset, best, near, enough):  # type: ignore[no-untyped-def]
     """The largest value in the interval that is on the stack, and when; or the first that is seen above `enough`.
 
@@ -153,7 +150,7 @@ def _top(tables, lanes, row, sign, offset, best, near, enough):  # type: ignore[
     return best, when
 
 
-@_compiled
+@inner
 def _first_met(tables, lanes, lane):  # type: ignore[no-untyped-def]
     """The guard that is met first in the last step of a lane, and when in s; Met.NOTHING where none is."""
     now, met, extremes = lanes.now, Met.NOTHING.value, tables.extremes.shape[0]
@@ -185,7 +182,7 @@ def _first_met(tables, lanes, lane):  # type: ignore[no-untyped-def]
     return met, end
 
 
-@_compiled
+@inner
 def _past(tables, probe, end):  # type: ignore[no-untyped-def]
     """A time in s just past that of a probe, up to which no state moves by more than a hundredth of its tolerance."""
     longest, tolerance = np.inf, probe[Row.TOLERANCE, 0]
@@ -197,7 +194,7 @@ def _past(tables, probe, end):  # type: ignore[no-untyped-def]
     return min(end, probe[Row.MOMENT, 0] + longest)
 
 
-@_compiled
+@inner
 def _measure(tables, lanes, seen, lane, end):  # type: ignore[no-untyped-def]
     """Take the inside of the last step of a lane into the extremes, up to a time in s and what is seen there."""
     now = lanes.now
@@ -215,7 +212,7 @@ def _measure(tables, lanes, seen, lane, end):  # type: ignore[no-untyped-def]
         now[tables.first[Row.BEST] + k, lane], now[tables.first[Row.LOWS] + k, lane] = best, lowest
 
 
-@_compiled
+@inner
 def _load(tables, course, lanes, lane, variant):  # type: ignore[no-untyped-def]
     """Let a variant begin in a lane."""
     now = lanes.now
@@ -234,7 +231,7 @@ def _load(tables, course, lanes, lane, variant):  # type: ignore[no-untyped-def]
         now[tables.first[Row.LOWS] + k, lane] = np.inf
 
 
-@_compiled
+@inner
 def _leave(tables, course, lanes, memory, x, lane, t, met):  # type: ignore[no-untyped-def]
     """Write where a variant has come to in a lane, from the row where its states stand, and what it has met."""
     variant = lanes.variants[lane]
@@ -249,7 +246,7 @@ def _leave(tables, course, lanes, memory, x, lane, t, met):  # type: ignore[no-u
         course.best[row, variant] = best if np.isnan(best) else max(course.best[row, variant], best)
 
 
-@_compiled
+@inner
 def _begin(tables, lanes, lane, last):  # type: ignore[no-untyped-def]
     """Set the first step: as the last one, in s, or such that no state changes by more than a hundredth of its size.
 
@@ -270,7 +267,7 @@ def _begin(tables, lanes, lane, last):  # type: ignore[no-untyped-def]
                 break
 
 
-@_compiled
+@inner
 def _arrived(tables, course, lanes, lane):  # type: ignore[no-untyped-def]
     """Whether a lane is done: it has met a guard in its last step, or is at its end."""
     now, met = lanes.now, Met.NOTHING.value
@@ -294,7 +291,7 @@ def _arrived(tables, course, lanes, lane):  # type: ignore[no-untyped-def]
     return True
 
 
-@_compiled
+@inner
 def _hopeless(now, lane, end):  # type: ignore[no-untyped-def]
     """Whether the steps of a lane have become too short, or so many are foreseen that it is better off alone.
 
@@ -306,7 +303,7 @@ def _hopeless(now, lane, end):  # type: ignore[no-untyped-def]
     return slow or (count > 0 and not now[Row.STEP, lane] > 8 * EPS * abs(t))
 
 
-@njit(error_model="numpy", cache=True)
+@compiled()
 def follow(  # type: ignore[no-untyped-def]
     rates, jets, probe, advance, compare, first, states, moving, guards, free, extremes, signs,
     t, x, p, ends, highs, sides, offsets, integrals, best, steps, met, nominal, limits,

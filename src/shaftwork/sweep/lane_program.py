@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 
 import numpy as np
-from numba import njit
 from numba.core.errors import NumbaError
 from sympy import Add, Dummy, Expr
 
@@ -19,7 +18,7 @@ from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import CompileError
 from shaftwork.formulation.explicit_rows import Rows
 from shaftwork.numerics.hermite import JET
-from shaftwork.numerics.machine_code import LANES, LaneBody, lane_function, run_at
+from shaftwork.numerics.machine_code import LANES, LaneBody, compiled, lane_function, run_at
 from shaftwork.results.measures import EXTREMES, POWERS
 from shaftwork.sweep.lane_loops import follow
 from shaftwork.sweep.lane_step import STAGES, Judged, StepWriter
@@ -208,7 +207,7 @@ class _Derivatives:
         return self._named[symbol]
 
 
-@njit(error_model="numpy", cache=True)
+@compiled()
 def _evaluate(function, first, t, x, p, values):  # type: ignore[no-untyped-def]
     """Write the values (rows, k) of a function at times (k,), states (n, k) and parameters (parameters, k)."""
     memory = np.zeros((first[Row.HEIGHT] + values.shape[0], LANES))

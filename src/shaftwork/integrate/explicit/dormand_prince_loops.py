@@ -8,15 +8,13 @@ b` takes numba a second.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from scipy.integrate import DOP853
 
 from shaftwork.integrate.crossings import LEFT, RESTING
-from shaftwork.numerics.machine_code import MATRIX, VECTOR, call_at
+from shaftwork.numerics.machine_code import MATRIX, VECTOR, call_at, compiled, inner
 from shaftwork.numerics.tolerances import EPS
 from shaftwork.numerics.zeros import LOOKS
 
@@ -29,20 +27,6 @@ PARTS = np.array([0.0, *LOOKS, 1.0])
 """Where a step near a guard or a switch is looked at, as parts of it."""
 
 
-def _compiled(signature: Any) -> Callable[[Any], Any]:
-    """Compile a function, and keep it for other processes where there is a folder for it."""
-
-    def decorate(function: Any) -> Any:
-        try:
-            return njit(signature, error_model="numpy", cache=True)(function)
-        except RuntimeError:  # no folder can be written
-            return njit(signature, error_model="numpy")(function)
-
-    return decorate
-
-
-_part = njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, no_rewrites=True)  # type: ignore[call-overload]
-"""Compile a function that others here alone call, without what would let Python call it."""
 _PLACES = types.Array(types.int64, 1, "C")
 _SYSTEM = types.Tuple((types.int64, types.int64, types.int64, types.float64, types.float64, VECTOR))  # type: ignore[no-untyped-call]
 """Addresses of its rates and of what is watched, how many of that are guards, the earliest and the latest time in s at
@@ -52,25 +36,25 @@ COURSE = PARTS.size + 5
 with which it is a height above zero; and how often in a row the motion has rested at a switch."""
 
 
-@_part
+@inner
 def _copy(x, y):  # type: ignore[no-untyped-def]
     for i in range(x.size):
         y[i] = x[i]
 
 
-@_part
+@inner
 def _rates(system, t, x, slope):  # type: ignore[no-untyped-def]
     rates, _, _, low, high, p = system
     call_at(rates, min(max(t, low), high), x, p, slope)
 
 
-@_part
+@inner
 def _values(system, t, x, values):  # type: ignore[no-untyped-def]
     _, watched, _, low, high, p = system
     call_at(watched, min(max(t, low), high), x, p, values)
 
 
-@_part
+@inner
 def _stage(slopes, factors, x, step, y):  # type: ignore[no-untyped-def]
     """Write into y (n,) the state at the next stage."""
     _copy(x, y)
@@ -81,7 +65,7 @@ def _stage(slopes, factors, x, step, y):  # type: ignore[no-untyped-def]
                 y[i] += factor * slopes[j, i]
 
 
-@_part
+@inner
 def _all_stages(system, t, x, step, slopes, y, end):  # type: ignore[no-untyped-def]
     """Write the slopes of a step whose first is known, and the state at its end."""
     for stage in range(1, STAGES):
@@ -90,7 +74,7 @@ def _all_stages(system, t, x, step, slopes, y, end):  # type: ignore[no-untyped-
     _stage(slopes, WEIGHTS[0], x, step, end)
 
 
-@_part
+@inner
 def _shapes(system, t, x, step, slopes, y, end, shapes):  # type: ignore[no-untyped-def]
     """Write what makes the dense output of a step from all its slopes, with that at the end; behind it its start."""
     for stage in range(FURTHER):
@@ -109,7 +93,7 @@ def _shapes(system, t, x, step, slopes, y, end, shapes):  # type: ignore[no-unty
         shapes[SHAPES, i] = x[i]
 
 
-@_part
+@inner
 def _inside(shapes, part, y):  # type: ignore[no-untyped-def]
     """Write the state at a part of a step."""
     for i in range(y.size):
@@ -119,7 +103,7 @@ def _inside(shapes, part, y):  # type: ignore[no-untyped-def]
         y[i] = shapes[SHAPES, i] + total
 
 
-@_part
+@inner
 def _error(slopes, x, new, step, atol, rtol):  # type: ignore[no-untyped-def]
     """Of a step, in parts of its tolerance."""
     fifth, third = 0.0, 0.0
@@ -134,7 +118,7 @@ def _error(slopes, x, new, step, atol, rtol):  # type: ignore[no-untyped-def]
     return step * fifth / math.sqrt(whole * x.size) if whole > 0 else whole
 
 
-@_part
+@inner
 def _factor(error, most):  # type: ignore[no-untyped-def]
     """How many times as long the next step may be."""
     if error == 0:
@@ -142,7 +126,7 @@ def _factor(error, most):  # type: ignore[no-untyped-def]
     return min(most, max(0.2, 0.9 * error**-0.125)) if error < np.inf else 0.2
 
 
-@_part
+@inner
 def _first_step(system, t, x, slope, limits, atol, rtol, y, other):  # type: ignore[no-untyped-def]
     """A first step in s of which the error is small: Hairer, section II.4."""
     size, speed, bend, n = 0.0, 0.0, 0.0, max(x.size, 1)
@@ -161,14 +145,14 @@ def _first_step(system, t, x, slope, limits, atol, rtol, y, other):  # type: ign
     return min(100 * guess, step, limits[3])
 
 
-@_part
+@inner
 def _height(course, row, c):  # type: ignore[no-untyped-def]
     """How far a guard is within its limit, or a switch on the side on which it starts."""
     side = course[PARTS.size + 2, c]
     return side * course[row, c] + course[PARTS.size + 3, c] if side != 0 else -abs(course[row, c])
 
 
-@_part
+@inner
 def _is_near(system, places, t, x, step, slopes, y, new, course):  # type: ignore[no-untyped-def]
     """Whether a guard or a switch is less than twice as far from zero as it moves in a step.
 
@@ -191,7 +175,7 @@ def _is_near(system, places, t, x, step, slopes, y, new, course):  # type: ignor
     return False
 
 
-@_part
+@inner
 def _watched(looks, part, row):  # type: ignore[no-untyped-def]
     """Write what is watched at a part of a step into a row."""
     system, _, t, step, shapes, course = looks
@@ -199,7 +183,7 @@ def _watched(looks, part, row):  # type: ignore[no-untyped-def]
     _values(system, t + part * step, shapes[SHAPES + 1], course[row])
 
 
-@_part
+@inner
 def _leaves(looks, c, band):  # type: ignore[no-untyped-def]
     """Parts of a step between which a height falls below zero by more than a band; -1 where it does not.
 
@@ -232,7 +216,7 @@ def _leaves(looks, c, band):  # type: ignore[no-untyped-def]
     return -1.0, -1.0
 
 
-@_part
+@inner
 def _first_met(looks, atol, rtol, uneven):  # type: ignore[no-untyped-def]
     """The part of a step at which a switch leaves its side first and this switch, the same of a guard, or -1 for none;
     and whether a guard is beyond its limit from the start, or has no value anywhere.
@@ -270,7 +254,7 @@ def _first_met(looks, atol, rtol, uneven):  # type: ignore[no-untyped-def]
     return first, met, part, guard, unclear
 
 
-@_part
+@inner
 def _end_at_switch(looks, part, c, end, limits, atol, rtol, rate):  # type: ignore[no-untyped-def]
     """The time in s at which a step has to end for a switch that leaves its side, if there is one; else infinite.
 
@@ -295,7 +279,7 @@ def _end_at_switch(looks, part, c, end, limits, atol, rtol, rate):  # type: igno
     return end
 
 
-@_compiled(
+@compiled(
     types.Tuple((types.int64, types.float64, types.int64, types.int64, types.boolean))(  # type: ignore[no-untyped-call]
         _SYSTEM, _PLACES, MATRIX, VECTOR, VECTOR, VECTOR, types.float64, VECTOR, VECTOR, VECTOR, MATRIX
     )
@@ -359,7 +343,7 @@ def advance(system, places, course, limits, x, atol, rtol, uneven, ends, lengths
     return count, step, tried, guard, unclear
 
 
-@_compiled(types.void(_SYSTEM, MATRIX, VECTOR, VECTOR, MATRIX, _PLACES, VECTOR, MATRIX))
+@compiled(types.void(_SYSTEM, MATRIX, VECTOR, VECTOR, MATRIX, _PLACES, VECTOR, MATRIX))
 def between(system, spans, starts, lengths, states, numbers, times, values):  # type: ignore[no-untyped-def]
     """Write the states at times inside steps, which are made again.
 
@@ -389,7 +373,7 @@ def between(system, spans, starts, lengths, states, numbers, times, values):  # 
         _inside(shapes, (times[k] - t) / length, values[k])
 
 
-@_compiled(types.void(types.int64, VECTOR, VECTOR, MATRIX, MATRIX))
+@compiled(types.void(types.int64, VECTOR, VECTOR, MATRIX, MATRIX))
 def values_at(code, p, times, states, values):  # type: ignore[no-untyped-def]
     """Write rates or what is watched (k, m), by the address of its code, at times (k,) in s and states (k, n)."""
     for k in range(times.size):
