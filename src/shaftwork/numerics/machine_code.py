@@ -26,14 +26,14 @@ _quantile = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double, ctypes.c_int)(
 )
 
 
-def compiled(*signature: Any) -> Callable[[Any], Any]:
+def compiled(signature: Any = None) -> Callable[[Any], Any]:
     """Compile a function, and keep it for other processes where there is a folder for it."""
 
     def decorate(function: Any) -> Any:
         try:
-            return njit(*signature, error_model="numpy", cache=True)(function)
+            return njit(signature, error_model="numpy", cache=True)(function)
         except RuntimeError:  # no folder can be written
-            return njit(*signature, error_model="numpy")(function)
+            return njit(signature, error_model="numpy")(function)
 
     return decorate
 
