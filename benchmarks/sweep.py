@@ -3,7 +3,7 @@
 Run `python -m benchmarks.sweep [VARIANTS]`; 10000 by default. Random stiffness, damping and pull-out torque; measured
 are the largest torque of the shaft and the speed at the end of 6.5 s. CPU: process time of the public call, set-up
 included, of the first call of this process and of a later one; less that of a call with a tenth of the variants it is
-without. The first one compiles, or finds what earlier processes have left in heyoka's cache, which with XDG_CACHE_HOME
+without. The first one compiles, or finds what earlier processes have left in numba's cache, which with NUMBA_CACHE_DIR
 in an empty folder is nothing. Error: against scipy at rtol 1e-10.
 """
 
