@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 import queue
 import sys
 import threading
@@ -68,10 +67,8 @@ class _Calls:
     def __init__(self, worker: Worker, task: Task, variants: Index, client: Any, distributed: Any) -> None:
         self._task, self._client, self._distributed = task, client, distributed
         try:  # as bytes, which only workers unpack
-            head = imported("cloudpickle", "cluster", "sweep(on=...)").dumps(
-                replace(task, columns=task.rows(slice(0, SIDE_BY_SIDE)))
-            )
-        except (pickle.PicklingError, TypeError, AttributeError) as error:
+            head = _packing().dumps(replace(task, columns=task.rows(slice(0, SIDE_BY_SIDE))))
+        except Exception as error:  # noqa: BLE001 (every kind of object has its own)
             raise ParameterError(
                 f"A measure cannot be sent to a cluster: {error}. Give a function of a file."
             ) from None
@@ -180,10 +177,15 @@ def _begun(head: bytes, expected: Mapping[str, str], why: str) -> Worker:
         raise SimulationError(
             f"A worker of the cluster has {', '.join(differing)}, and may come to other digits. Install the same there."
         )
-    worker = Worker(pickle.loads(head))  # noqa: S301 (what a cluster runs is trusted)
+    worker = Worker(_packing().loads(head))
     if worker.why != why:
         raise SimulationError(f"A worker of the cluster runs variants in another way: '{worker.why}' for '{why}'.")
     return worker
+
+
+def _packing() -> Any:
+    """How Dask itself sends what a cluster runs."""
+    return imported("distributed.protocol.pickle", "cluster", "sweep(on=...)")
 
 
 def libraries() -> dict[str, str]:

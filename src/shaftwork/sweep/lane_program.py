@@ -22,7 +22,7 @@ from shaftwork.numerics.machine_code import LANES, LaneBody, compiled, lane_func
 from shaftwork.results.measures import EXTREMES, POWERS
 from shaftwork.sweep.lane_loops import follow
 from shaftwork.sweep.lane_step import STAGES, Judged, StepWriter
-from shaftwork.sweep.lane_tables import LaneCourse, LaneTables, Row
+from shaftwork.sweep.lane_tables import LaneCourse, LaneRow, LaneTables
 
 OF_A_STEP, LOOSEST_TOLERANCE, TIGHTEST_TOLERANCE = 0.1, 1e-7, 1e-13
 """The tolerance of a step as a part of that of the motion, and its bounds."""
@@ -63,13 +63,13 @@ class LaneProgram:
         self.integrated = [k for k, kind in enumerate(kinds) if kind in POWERS]
         """Which measures are integrals."""
         place = seen.rows(len(rows.parameters) + len(self._fixed.places))
-        write = partial(lane_function, rows={row.name.lower(): int(place[row]) for row in Row})
+        write = partial(lane_function, rows={row.name.lower(): int(place[row]) for row in LaneRow})
         try:
             rates, jets, self._points = (
                 write(partial(self._write, values=values, definitions=definitions))
                 for values, definitions in ((seen.slopes, {}), (seen.sight, seen.motion.definitions), (points, {}))
             )
-            steps = seen.steps(rates.address, int(place[Row.SLOPES]))
+            steps = seen.steps(rates.address, int(place[LaneRow.SLOPES]))
             self._code = rates, jets, *map(write, (steps.probe, steps.advance, steps.compare))
         except NumbaError as error:
             raise CompileError(f"A law has no machine code: {error}") from error
@@ -160,7 +160,7 @@ class _Seen:
         sizes |= {"slopes": STAGES * slopes, "fifth": slopes, "third": slopes, "fifths": states, "thirds": states}
         sizes |= {"sight": len(self.sight), "last_sight": JET * (extremes + watched), "best": extremes}
         sizes |= {"lows": extremes, "sides": watched, "offsets": watched, "p": parameters}
-        return np.cumsum([0, *(sizes.get(row.name.lower(), 1) for row in Row if row is not Row.HEIGHT)])
+        return np.cumsum([0, *(sizes.get(row.name.lower(), 1) for row in LaneRow if row is not LaneRow.HEIGHT)])
 
 
 def lane_program(
@@ -210,16 +210,16 @@ class _Derivatives:
 @compiled()
 def _evaluate(function, first, t, x, p, values):  # type: ignore[no-untyped-def]
     """Write the values (rows, k) of a function at times (k,), states (n, k) and parameters (parameters, k)."""
-    memory = np.zeros((first[Row.HEIGHT] + values.shape[0], LANES))
+    memory = np.zeros((first[LaneRow.HEIGHT] + values.shape[0], LANES))
     for start in range(0, t.size, LANES):
         for lane in range(LANES):
             variant = min(start + lane, t.size - 1)
-            memory[Row.MOMENT, lane] = t[variant]
+            memory[LaneRow.MOMENT, lane] = t[variant]
             for row in range(x.shape[0]):
-                memory[first[Row.Y] + row, lane] = x[row, variant]
+                memory[first[LaneRow.Y] + row, lane] = x[row, variant]
             for row in range(p.shape[0]):
-                memory[first[Row.P] + row, lane] = p[row, variant]
-        run_at(function, memory, first[Row.HEIGHT])
+                memory[first[LaneRow.P] + row, lane] = p[row, variant]
+        run_at(function, memory, first[LaneRow.HEIGHT])
         for lane in range(min(LANES, t.size - start)):
             for row in range(values.shape[0]):
-                values[row, start + lane] = memory[first[Row.HEIGHT] + row, lane]
+                values[row, start + lane] = memory[first[LaneRow.HEIGHT] + row, lane]

@@ -16,7 +16,7 @@ class Met(IntEnum):
     A_LIMIT = -3
 
 
-class Row(IntEnum):
+class LaneRow(IntEnum):
     """What stands in the memory of a block of lanes: what has one row, of which this is the number, and then arrays."""
 
     TOLERANCE = 0
@@ -94,7 +94,7 @@ class LaneTables(NamedTuple):
         probe: makes a step of a given size.
         advance: makes a step that is as long as the tolerance lets it be.
         compare: looks at the ends of the last step.
-        first: (Row.HEIGHT + 1,) the first row of each array.
+        first: (LaneRow.HEIGHT + 1,) the first row of each array.
         states: how many; integrals follow them,
         moving: and so many are both.
         guards: how many of those seen are guards and switches; they come last.
