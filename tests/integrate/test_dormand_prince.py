@@ -123,3 +123,11 @@ def test_jacobians_of_many_states_are_those_of_each(scene: str) -> None:
     for many, time, x in zip(bound.jacobians(times, states), times.tolist(), states, strict=True):
         one = bound.jacobian(time, x).toarray()
         np.testing.assert_allclose(many, one, atol=1e-12 * np.abs(one).max())  # sums in another order
+
+
+def test_a_motion_that_laws_drive_back_to_their_jump_is_refused_as_by_scipy() -> None:
+    net = sw.Network("driven back")
+    net.add(sw.TorqueSource("motor", tau=1 - 3 * sympy.sign(sw.omega - 1)), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    with pytest.raises(sw.SimulationError, match="drive the motion back"):
+        net.simulate(1.0, engine="numba")

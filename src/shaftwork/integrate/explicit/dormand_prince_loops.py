@@ -260,9 +260,13 @@ def _end_at_switch(looks, part, c, end, limits, atol, rtol, rate):  # type: igno
 
     It is that of `Crossings.cut`.
     """
+    system, places, t, step, shapes, course = looks
     if c < 0:
+        for switch in places:  # within its band
+            if switch >= system[2] and _height(course, PARTS.size - 1, switch) < 0:
+                limits[5] += 1
+                break
         return np.inf
-    system, _, t, step, shapes, course = looks
     y, rests = shapes[SHAPES + 1], course[PARTS.size + 4]
     time, longest, value = t + part * step, np.inf, course[0, c]
     _inside(shapes, part, y)
