@@ -48,10 +48,10 @@ def _look(tables, memory):  # type: ignore[no-untyped-def]
     """See what there is at the start of a step, and write the first slopes."""
     for lane in range(LANES):
         for row in range(tables.moving):
-            memory[tables.first[LaneRow.Y] + row, lane] = memory[tables.first[LaneRow.X] + row, lane]
-        memory[LaneRow.MOMENT, lane] = min(memory[LaneRow.TIME, lane], memory[LaneRow.HIGH, lane])
-    run_at(tables.jets, memory, tables.first[LaneRow.SIGHT])
-    run_at(tables.rates, memory, tables.first[LaneRow.SLOPES])
+            memory[tables.first[LaneRow.Y.value] + row, lane] = memory[tables.first[LaneRow.X.value] + row, lane]
+        memory[LaneRow.MOMENT.value, lane] = min(memory[LaneRow.TIME.value, lane], memory[LaneRow.HIGH.value, lane])
+    run_at(tables.jets, memory, tables.first[LaneRow.SIGHT.value])
+    run_at(tables.rates, memory, tables.first[LaneRow.SLOPES.value])
 
 
 @inner
@@ -64,11 +64,11 @@ def _jet(memory, row, sign, offset, lane):  # type: ignore[no-untyped-def]
 def _repeat(tables, lanes, lane):  # type: ignore[no-untyped-def]
     """Let all lanes of the probe start where the last step of one did."""
     probe, now, first = lanes.probe, lanes.now, tables.first
-    for row in range(first[LaneRow.HEIGHT]):
+    for row in range(first[LaneRow.HEIGHT.value]):
         _fill(probe, row, now[row, lane])
     for row in range(tables.moving):
-        _fill(probe, first[LaneRow.X] + row, now[first[LaneRow.LAST_X] + row, lane])
-    _fill(probe, LaneRow.TIME, now[LaneRow.LAST_TIME, lane])
+        _fill(probe, first[LaneRow.X.value] + row, now[first[LaneRow.LAST_X.value] + row, lane])
+    _fill(probe, LaneRow.TIME.value, now[LaneRow.LAST_TIME.value, lane])
     _look(tables, probe)
 
 
@@ -76,12 +76,12 @@ def _repeat(tables, lanes, lane):  # type: ignore[no-untyped-def]
 def _probe(tables, probe, t):  # type: ignore[no-untyped-def]
     """Follow the lane in a probe up to a time in s, and see what is there."""
     first = tables.first
-    _fill(probe, LaneRow.SIZE, t - probe[LaneRow.TIME, 0])
+    _fill(probe, LaneRow.SIZE.value, t - probe[LaneRow.TIME.value, 0])
     run_at(tables.probe, probe, 0)
     for row in range(tables.moving):
-        _fill(probe, first[LaneRow.Y] + row, probe[first[LaneRow.NEW] + row, 0])
-    _fill(probe, LaneRow.MOMENT, min(t, probe[LaneRow.HIGH, 0]))
-    run_at(tables.jets, probe, first[LaneRow.SIGHT])
+        _fill(probe, first[LaneRow.Y.value] + row, probe[first[LaneRow.NEW.value] + row, 0])
+    _fill(probe, LaneRow.MOMENT.value, min(t, probe[LaneRow.HIGH.value, 0]))
+    run_at(tables.jets, probe, first[LaneRow.SIGHT.value])
 
 
 @inner
@@ -154,20 +154,20 @@ def _top(tables, lanes, row, sign, offset, best, near, enough):  # type: ignore[
 def _first_met(tables, lanes, lane):  # type: ignore[no-untyped-def]
     """The guard that is met first in the last step of a lane, and when in s; Met.NOTHING where none is."""
     now, met, extremes = lanes.now, Met.NOTHING.value, tables.extremes.shape[0]
-    low, high = now[LaneRow.LAST_TIME, lane], now[LaneRow.TIME, lane]
+    low, high = now[LaneRow.LAST_TIME.value, lane], now[LaneRow.TIME.value, lane]
     end = high
     for guard in range(tables.guards):
         side, offset, number = (
-            now[tables.first[LaneRow.SIDES] + guard, lane],
-            now[tables.first[LaneRow.OFFSETS] + guard, lane],
+            now[tables.first[LaneRow.SIDES.value] + guard, lane],
+            now[tables.first[LaneRow.OFFSETS.value] + guard, lane],
             extremes + guard,
         )
-        left = _jet(now, tables.first[LaneRow.LAST_SIGHT] + JET * number, side, offset, lane)
-        right = _jet(now, tables.first[LaneRow.SIGHT] + JET * number, side, offset, lane)
+        left = _jet(now, tables.first[LaneRow.LAST_SIGHT.value] + JET * number, side, offset, lane)
+        right = _jet(now, tables.first[LaneRow.SIGHT.value] + JET * number, side, offset, lane)
         inside, beyond = reach(high - low, left, right)
         if side == 0.0 or (right[0] <= 0 and inside + beyond <= 0):
             continue
-        upper, value, row = high, right[0], tables.first[LaneRow.SIGHT] + JET * number
+        upper, value, row = high, right[0], tables.first[LaneRow.SIGHT.value] + JET * number
         if value <= 0:
             _put(lanes.stack, 0, low, left, high, right, 0.0, 0.0)
             near = TYPED * max(abs(left[0]), abs(right[0]))
@@ -185,66 +185,66 @@ def _first_met(tables, lanes, lane):  # type: ignore[no-untyped-def]
 @inner
 def _past(tables, probe, end):  # type: ignore[no-untyped-def]
     """A time in s just past that of a probe, up to which no state moves by more than a hundredth of its tolerance."""
-    longest, tolerance = np.inf, probe[LaneRow.TOLERANCE, 0]
+    longest, tolerance = np.inf, probe[LaneRow.TOLERANCE.value, 0]
     for row in range(tables.states):
-        x = probe[tables.first[LaneRow.NEW] + row, 0]
-        rate = (x - probe[tables.first[LaneRow.X] + row, 0]) / probe[LaneRow.SIZE, 0]
+        x = probe[tables.first[LaneRow.NEW.value] + row, 0]
+        rate = (x - probe[tables.first[LaneRow.X.value] + row, 0]) / probe[LaneRow.SIZE.value, 0]
         if rate != 0.0:
             longest = min(
-                longest, 0.01 * tolerance * (probe[tables.first[LaneRow.NOMINAL] + row, 0] + abs(x)) / abs(rate)
+                longest, 0.01 * tolerance * (probe[tables.first[LaneRow.NOMINAL.value] + row, 0] + abs(x)) / abs(rate)
             )
-    return min(end, probe[LaneRow.MOMENT, 0] + longest)
+    return min(end, probe[LaneRow.MOMENT.value, 0] + longest)
 
 
 @inner
 def _measure(tables, lanes, seen, lane, end):  # type: ignore[no-untyped-def]
     """Take the inside of the last step of a lane into the extremes, up to a time in s and what is seen there."""
     now = lanes.now
-    low = now[LaneRow.LAST_TIME, lane]
+    low = now[LaneRow.LAST_TIME.value, lane]
     for k in range(tables.extremes.shape[0]):
         number, sign = JET * tables.extremes[k, 0], tables.signs[k]
-        left = _jet(now, tables.first[LaneRow.LAST_SIGHT] + number, sign, 0.0, lane)
-        right = _jet(seen, tables.first[LaneRow.SIGHT] + number, sign, 0.0, lane)
-        best = max(now[tables.first[LaneRow.BEST] + k, lane], left[0], right[0])
-        lowest = min(now[tables.first[LaneRow.LOWS] + k, lane], left[0], right[0])
+        left = _jet(now, tables.first[LaneRow.LAST_SIGHT.value] + number, sign, 0.0, lane)
+        right = _jet(seen, tables.first[LaneRow.SIGHT.value] + number, sign, 0.0, lane)
+        best = max(now[tables.first[LaneRow.BEST.value] + k, lane], left[0], right[0])
+        lowest = min(now[tables.first[LaneRow.LOWS.value] + k, lane], left[0], right[0])
         _put(lanes.stack, 0, low, left, end, right, 0.0, 0.0)
         best, _ = _top(
-            tables, lanes, tables.first[LaneRow.SIGHT] + number, sign, 0.0, best, TYPED * (best - lowest), np.inf
+            tables, lanes, tables.first[LaneRow.SIGHT.value] + number, sign, 0.0, best, TYPED * (best - lowest), np.inf
         )
-        now[tables.first[LaneRow.BEST] + k, lane], now[tables.first[LaneRow.LOWS] + k, lane] = best, lowest
+        now[tables.first[LaneRow.BEST.value] + k, lane], now[tables.first[LaneRow.LOWS.value] + k, lane] = best, lowest
 
 
 @inner
 def _load(tables, course, lanes, lane, variant):  # type: ignore[no-untyped-def]
     """Let a variant begin in a lane."""
     now = lanes.now
-    now[LaneRow.TIME, lane], now[LaneRow.BEGUN, lane] = course.t[variant], course.t[variant]
-    now[LaneRow.HIGH, lane], now[LaneRow.END, lane] = course.highs[variant], course.ends[variant]
-    now[LaneRow.ACTIVE, lane], now[LaneRow.STEP, lane], now[LaneRow.MADE, lane] = 1.0, -1.0, 0.0
+    now[LaneRow.TIME.value, lane], now[LaneRow.BEGUN.value, lane] = course.t[variant], course.t[variant]
+    now[LaneRow.HIGH.value, lane], now[LaneRow.END.value, lane] = course.highs[variant], course.ends[variant]
+    now[LaneRow.ACTIVE.value, lane], now[LaneRow.STEP.value, lane], now[LaneRow.MADE.value, lane] = 1.0, -1.0, 0.0
     for row in range(tables.moving):
-        now[tables.first[LaneRow.X] + row, lane] = course.x[row, variant] if row < tables.states else 0.0
+        now[tables.first[LaneRow.X.value] + row, lane] = course.x[row, variant] if row < tables.states else 0.0
     for row in range(course.p.shape[0]):
-        now[tables.first[LaneRow.P] + row, lane] = course.p[row, variant]
+        now[tables.first[LaneRow.P.value] + row, lane] = course.p[row, variant]
     for guard in range(tables.guards):
-        now[tables.first[LaneRow.SIDES] + guard, lane] = course.sides[guard, variant]
-        now[tables.first[LaneRow.OFFSETS] + guard, lane] = course.offsets[guard, variant]
+        now[tables.first[LaneRow.SIDES.value] + guard, lane] = course.sides[guard, variant]
+        now[tables.first[LaneRow.OFFSETS.value] + guard, lane] = course.offsets[guard, variant]
     for k in range(tables.extremes.shape[0]):
-        now[tables.first[LaneRow.BEST] + k, lane] = course.best[tables.extremes[k, 1], variant]
-        now[tables.first[LaneRow.LOWS] + k, lane] = np.inf
+        now[tables.first[LaneRow.BEST.value] + k, lane] = course.best[tables.extremes[k, 1], variant]
+        now[tables.first[LaneRow.LOWS.value] + k, lane] = np.inf
 
 
 @inner
 def _leave(tables, course, lanes, memory, x, lane, t, met):  # type: ignore[no-untyped-def]
     """Write where a variant has come to in a lane, from the row where its states stand, and what it has met."""
     variant = lanes.variants[lane]
-    course.met[variant], course.t[variant], course.steps[variant] = met, t, lanes.now[LaneRow.SIZE, lane]
+    course.met[variant], course.t[variant], course.steps[variant] = met, t, lanes.now[LaneRow.SIZE.value, lane]
     for row in range(tables.moving):
         if row < tables.states:
             course.x[row, variant] = memory[x + row, lane]
         else:
             course.integrals[row - tables.states, variant] += memory[x + row, lane]
     for k in range(tables.extremes.shape[0]):
-        row, best = tables.extremes[k, 1], lanes.now[tables.first[LaneRow.BEST] + k, lane]
+        row, best = tables.extremes[k, 1], lanes.now[tables.first[LaneRow.BEST.value] + k, lane]
         course.best[row, variant] = best if np.isnan(best) else max(course.best[row, variant], best)
 
 
@@ -256,16 +256,16 @@ def _begin(tables, lanes, lane, last):  # type: ignore[no-untyped-def]
     """
     now, step = lanes.now, np.inf
     for row in range(tables.states):
-        x, rate = now[tables.first[LaneRow.X] + row, lane], now[tables.first[LaneRow.SLOPES] + row, lane]
+        x, rate = now[tables.first[LaneRow.X.value] + row, lane], now[tables.first[LaneRow.SLOPES.value] + row, lane]
         if rate != 0.0:
-            step = min(step, 0.01 * (now[tables.first[LaneRow.NOMINAL] + row, lane] + abs(x)) / abs(rate))
-    now[LaneRow.STEP, lane] = max(step, last)
+            step = min(step, 0.01 * (now[tables.first[LaneRow.NOMINAL.value] + row, lane] + abs(x)) / abs(rate))
+    now[LaneRow.STEP.value, lane] = max(step, last)
     for guard in range(tables.guards - tables.free, tables.guards):
-        now[tables.first[LaneRow.SIDES] + guard, lane] = 0.0
-        row = tables.first[LaneRow.SIGHT] + JET * (tables.extremes.shape[0] + guard)
+        now[tables.first[LaneRow.SIDES.value] + guard, lane] = 0.0
+        row = tables.first[LaneRow.SIGHT.value] + JET * (tables.extremes.shape[0] + guard)
         for value in _jet(now, row, 1.0, 0.0, lane):
             if value != 0.0:
-                now[tables.first[LaneRow.SIDES] + guard, lane] = -np.sign(value)
+                now[tables.first[LaneRow.SIDES.value] + guard, lane] = -np.sign(value)
                 break
 
 
@@ -273,7 +273,7 @@ def _begin(tables, lanes, lane, last):  # type: ignore[no-untyped-def]
 def _arrived(tables, course, lanes, lane):  # type: ignore[no-untyped-def]
     """Whether a lane is done: it has met a guard in its last step, or is at its end."""
     now, met = lanes.now, Met.NOTHING.value
-    end, last, close = now[LaneRow.TIME, lane], now[LaneRow.END, lane], now[LaneRow.CLOSE, lane] > 0
+    end, last, close = now[LaneRow.TIME.value, lane], now[LaneRow.END.value, lane], now[LaneRow.CLOSE.value, lane] > 0
     if close:
         _repeat(tables, lanes, lane)
         met, end = _first_met(tables, lanes, lane)
@@ -281,7 +281,7 @@ def _arrived(tables, course, lanes, lane):  # type: ignore[no-untyped-def]
         if close:
             _measure(tables, lanes, now, lane, end)
         if end >= last:
-            _leave(tables, course, lanes, now, tables.first[LaneRow.X], lane, end, Met.THE_END.value)
+            _leave(tables, course, lanes, now, tables.first[LaneRow.X.value], lane, end, Met.THE_END.value)
         return end >= last
     _probe(tables, lanes.probe, end)
     if met >= tables.guards - tables.free:
@@ -289,7 +289,7 @@ def _arrived(tables, course, lanes, lane):  # type: ignore[no-untyped-def]
         _probe(tables, lanes.probe, end)
     there = lanes.probe.copy()
     _measure(tables, lanes, there, lane, end)
-    _leave(tables, course, lanes, there, tables.first[LaneRow.NEW], lane, end, met)
+    _leave(tables, course, lanes, there, tables.first[LaneRow.NEW.value], lane, end, met)
     return True
 
 
@@ -299,10 +299,10 @@ def _hopeless(now, lane, end):  # type: ignore[no-untyped-def]
 
     A variant that will take more than 100 000 up to the end is stiff, or swings that often.
     """
-    t, count = now[LaneRow.TIME, lane], now[LaneRow.MADE, lane]
-    gone = t - now[LaneRow.BEGUN, lane]
+    t, count = now[LaneRow.TIME.value, lane], now[LaneRow.MADE.value, lane]
+    gone = t - now[LaneRow.BEGUN.value, lane]
     slow = count > 4 * LANES and count * (gone + end - t) > 100_000 * gone
-    return slow or (count > 0 and not now[LaneRow.STEP, lane] > 8 * EPS * abs(t))
+    return slow or (count > 0 and not now[LaneRow.STEP.value, lane] > 8 * EPS * abs(t))
 
 
 @compiled()
@@ -323,24 +323,24 @@ def follow(  # type: ignore[no-untyped-def]
     tables = LaneTables(rates, jets, probe, advance, compare, first, states, moving, guards, free, extremes, signs)
     course = LaneCourse(t, x, p, ends, highs, sides, offsets, integrals, best, steps, met)
     lanes = _Lanes(
-        np.zeros((tables.first[LaneRow.HEIGHT], LANES)),
-        np.zeros((tables.first[LaneRow.HEIGHT], LANES)),
+        np.zeros((tables.first[LaneRow.HEIGHT.value], LANES)),
+        np.zeros((tables.first[LaneRow.HEIGHT.value], LANES)),
         np.zeros((LANES * JET, 10)),
         np.full(LANES, -1),
     )
     now, variants, waiting, busy = lanes.now, lanes.variants, course.t.size, True
-    _fill(now, LaneRow.TOLERANCE, limits[0])
-    _fill(now, LaneRow.LONGEST, limits[1])
+    _fill(now, LaneRow.TOLERANCE.value, limits[0])
+    _fill(now, LaneRow.LONGEST.value, limits[1])
     for row in range(tables.states):
-        _fill(now, tables.first[LaneRow.NOMINAL] + row, nominal[row])
+        _fill(now, tables.first[LaneRow.NOMINAL.value] + row, nominal[row])
     while busy:
         _look(tables, now)
         run_at(tables.compare, now, 0)
         busy, loaded = False, False
         for lane in range(LANES):
             variant = variants[lane]
-            to_see = now[LaneRow.CLOSE, lane] > 0 or now[LaneRow.TIME, lane] >= now[LaneRow.END, lane]
-            if now[LaneRow.MOVED, lane] > 0 and to_see:
+            to_see = now[LaneRow.CLOSE.value, lane] > 0 or now[LaneRow.TIME.value, lane] >= now[LaneRow.END.value, lane]
+            if now[LaneRow.MOVED.value, lane] > 0 and to_see:
                 if _arrived(tables, course, lanes, lane):
                     variant = -1
             elif variant >= 0 and _hopeless(now, lane, limits[2]):
@@ -349,12 +349,12 @@ def follow(  # type: ignore[no-untyped-def]
                 variant, waiting, loaded = course.t.size - waiting, waiting - 1, True
                 _load(tables, course, lanes, lane, variant)
             elif variant < 0:
-                now[LaneRow.ACTIVE, lane] = 0.0
+                now[LaneRow.ACTIVE.value, lane] = 0.0
             variants[lane] = variant
             busy = busy or variant >= 0
         if loaded:
             _look(tables, now)
             for lane in range(LANES):
-                if now[LaneRow.STEP, lane] < 0:
+                if now[LaneRow.STEP.value, lane] < 0:
                     _begin(tables, lanes, lane, course.steps[variants[lane]])
         run_at(tables.advance, now, 0)

@@ -210,16 +210,16 @@ class _Derivatives:
 @compiled()
 def _evaluate(function, first, t, x, p, values):  # type: ignore[no-untyped-def]
     """Write the values (rows, k) of a function at times (k,), states (n, k) and parameters (parameters, k)."""
-    memory = np.zeros((first[LaneRow.HEIGHT] + values.shape[0], LANES))
+    memory = np.zeros((first[LaneRow.HEIGHT.value] + values.shape[0], LANES))
     for start in range(0, t.size, LANES):
         for lane in range(LANES):
             variant = min(start + lane, t.size - 1)
-            memory[LaneRow.MOMENT, lane] = t[variant]
+            memory[LaneRow.MOMENT.value, lane] = t[variant]
             for row in range(x.shape[0]):
-                memory[first[LaneRow.Y] + row, lane] = x[row, variant]
+                memory[first[LaneRow.Y.value] + row, lane] = x[row, variant]
             for row in range(p.shape[0]):
-                memory[first[LaneRow.P] + row, lane] = p[row, variant]
-        run_at(function, memory, first[LaneRow.HEIGHT])
+                memory[first[LaneRow.P.value] + row, lane] = p[row, variant]
+        run_at(function, memory, first[LaneRow.HEIGHT.value])
         for lane in range(min(LANES, t.size - start)):
             for row in range(values.shape[0]):
-                values[row, start + lane] = memory[first[LaneRow.HEIGHT] + row, lane]
+                values[row, start + lane] = memory[first[LaneRow.HEIGHT.value] + row, lane]
