@@ -127,34 +127,60 @@ class StateTransfer:
         """
         if not (self._form.dependent_across or self._form.dependent_through):
             return np.array([stored[name] for name in self._states])
-        by_stores, by_inputs = self._to_states(bound.part, lambda: self._state_maps(bound.part))
+        by_stores, by_inputs = self._to_states(
+            bound.part, lambda: self._state_maps(bound.part.coefficients, *_full(bound.part))
+        )
         x = by_stores @ np.array([stored[name] for name in self.names])
         if by_inputs.any():
             x += by_inputs @ bound.program.inputs.sources(t, x, bound.p)
         return np.asarray(x)
 
-    def _state_maps(self, part: LinearPart) -> tuple[Array, Array]:
-        """(n, stores) and (n, m) what stores and inputs are multiplied by in the states that equations start with."""
-        form, k, laws, (loops, cutsets) = self._form, part.coefficients, len(self._form.laws), _full(part)
+    def taken_up(self, bound: BoundArrays, p: Array, stored: Array) -> Array:
+        """(n, k) the states that the equations start with, for parameters (parameters, k) and all stored (stores, k).
+
+        Raises:
+            CompileError: they depend on more than on what is stored and on inertias.
+        """
+        form, gains = self._form, {*bound.program.assembly.loops.places, *bound.program.assembly.cutsets.places}
+        if form.dependent_through or form.across_inputs or (p[sorted(gains)] != bound.p[sorted(gains), None]).any():
+            raise CompileError("What is stored goes over to these states in a way of its own for each variant.")
+        coefficients = bound.program.assembly.coefficients(p)
+        by_stores, _ = self._state_maps(coefficients.T, *_full(bound.part))
+        return np.einsum("kns,sk->nk", by_stores, stored)
+
+    def _state_maps(self, k: Array, loops: Array, cutsets: Array) -> tuple[Array, Array]:
+        """(n, stores) and (n, m) what stores and inputs are multiplied by in the states that equations start with.
+
+        Args:
+            k: (branches,) coefficients, or those of many networks, (..., branches): then all comes for each.
+            loops, cutsets: F and Q.
+        """
+        form, laws, many = self._form, len(self._form.laws), k.shape[:-1]
         size, angles, stores = len(form.states), len(form.integrals), len(self.branches)
-        by_branches, by_inputs = np.zeros((size, len(k))), np.zeros((size, laws + len(form.across_inputs)))
+        by_branches = np.zeros((*many, size, k.shape[-1]))
+        by_inputs = np.zeros((*many, size, laws + len(form.across_inputs)))
         across, through = list(form.across_states), list(form.through_states)
         speeds, torques = form.speeds, form.torques
-        by_branches[speeds, across], by_branches[torques, through] = np.eye(len(across)), np.eye(len(through))
+        by_branches[..., speeds, across] = np.eye(len(across))
+        by_branches[..., torques, through] = np.eye(len(through))
         if other := list(form.dependent_across):
             F, Q = (matrix[np.ix_(across, other)] for matrix in (loops, cutsets))
-            taken_up = np.linalg.inv(np.diag(k[across]) + Q * k[other] @ F.T)
-            by_branches[speeds, across], by_branches[speeds, other] = taken_up * k[across], taken_up @ Q * k[other]
-            by_inputs[speeds, laws:] = -by_branches[speeds, other] @ loops[np.ix_(list(form.across_inputs), other)].T
+            own, others = k[..., None, across], k[..., None, other]
+            taken_up = np.linalg.inv(own * np.eye(len(across)) + Q * others @ F.T)
+            by_branches[..., speeds, across], by_branches[..., speeds, other] = taken_up * own, taken_up @ Q * others
+            inputs = loops[np.ix_(list(form.across_inputs), other)]
+            by_inputs[..., speeds, laws:] = -by_branches[..., speeds, other] @ inputs.T
         if other := list(form.dependent_through):
             F, Q = (matrix[np.ix_(other, through)] for matrix in (loops, cutsets))
-            taken_up = np.linalg.inv(np.diag(1 / k[through]) + F.T / k[other] @ Q)
-            by_branches[torques, through] = taken_up / k[through]
-            by_branches[torques, other] = -taken_up @ F.T / k[other]
-            by_inputs[torques, :laws] = by_branches[torques, other] @ cutsets[np.ix_(other, list(form.laws))]
-        by_stores = np.zeros((size, len(self.names)))
-        by_stores[:, :stores] = by_branches[:, list(self.branches.values())]
-        by_stores[size - angles :, stores:] = np.eye(angles)
+            own, others = k[..., None, through], k[..., None, other]
+            taken_up = np.linalg.inv(np.eye(len(through)) / own + F.T / others @ Q)
+            by_branches[..., torques, through] = taken_up / own
+            by_branches[..., torques, other] = -taken_up @ F.T / others
+            inputs = cutsets[np.ix_(other, list(form.laws))]
+            by_inputs[..., torques, :laws] = by_branches[..., torques, other] @ inputs
+        by_stores = np.zeros((*many, size, len(self.names)))
+        by_stores[..., :stores] = by_branches[..., list(self.branches.values())]
+        by_stores[..., size - angles :, stores:] = np.eye(angles)
         return by_stores, by_inputs
 
     def energy(self, bound: BoundArrays, stored: Mapping[str, float]) -> float:

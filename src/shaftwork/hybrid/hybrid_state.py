@@ -331,20 +331,28 @@ def passes_limit(state: HybridState, t: float) -> bool:
     return any(side_of_limit(active.side * now[active.guard], wide[active.guard]) > 0 for active in watched)
 
 
+def slipping(
+    machines: Sequence[ModeMachine], modes: ModeNames, watched: Sequence[ActiveGuard]
+) -> dict[int, ActiveGuard]:
+    """Machines that slip, each with the guard at which it would hold, by a torque that is limited."""
+    slips = dict[int, ActiveGuard]()
+    for active in watched:
+        k, to = active.machine, active.leave.to
+        if to and any(back.by_torque and back.to == modes[k] for back in machines[k].modes[to].leaves):
+            slips[k] = active
+    return slips
+
+
 def resting(state: HybridState, t: float) -> dict[int, str]:
     """Machines that slip, with no speed across them as others hold their ends, and the modes in which they hold."""
-    regime, slipping = state.regime, dict[int, ActiveGuard]()
-    for active in regime.watched:
-        k = active.machine
-        modes, name = regime.machines[k].modes, regime.modes[k]
-        if active.leave.to and any(back.by_torque and back.to == name for back in modes[active.leave.to].leaves):
-            slipping[k] = active
-    if not slipping:
+    regime = state.regime
+    slips = slipping(regime.machines, regime.modes, regime.watched)
+    if not slips:
         return {}
     here = state.course(t)
     now, near, still = here[3], regime.guards_at(*regime.beside(here)), regime.equations.resting
     return {
         k: active.leave.to
-        for k, active in slipping.items()
+        for k, active in slips.items()
         if (k in still and active.leave.by_speed) or now[active.guard] == near[active.guard] == 0.0
     }

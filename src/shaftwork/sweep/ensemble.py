@@ -8,11 +8,12 @@ own side or about to be. A variant of which anything else is true is left to `Mo
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from sympy import Expr
 
-from shaftwork.codegen.array_form.elements import Array, Index
+from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.shafts import Shaft
 from shaftwork.core.errors import CompileError, NetworkError
@@ -156,6 +157,21 @@ class Ensemble:
         """Whether a parameter that varies decides in which mode a motion starts."""
         return False
 
+    def struck(self, group: VariantGroup, guard: int, columns: Array) -> list[VariantGroup]:  # noqa: ARG002
+        """Past a guard that is that of a rigid contact: the lanes in which what follows is beyond doubt."""
+        return []
+
+    def settled(self, one: VariantGroup, values: Array, after: float, entry: PhaseEntry) -> VariantGroup | None:  # noqa: ARG002
+        """A lane past what it has met, or None where it is better off alone.
+
+        Args:
+            one: a group of this lane alone.
+            values: (names,) of the parameters that vary.
+            after: a time just behind the instant, s.
+            entry: what it has met, as of this lane.
+        """
+        return None
+
     def after(self, group: VariantGroup, guard: int, p: Array) -> list[tuple[ModeNames, Mask]]:  # noqa: ARG002
         """The modes to which a guard leads by itself, and the lanes (k,) that go there; there is no guard."""
         return []
@@ -172,12 +188,13 @@ class _VariantCourse:
         self.values = np.array([np.full(count, starts.get(kind, 0.0)) for kind in kinds]).reshape(len(kinds), count)
         self._extreme = np.array([kind in EXTREMES for kind in kinds], dtype=bool)
         self.done = np.zeros(count, dtype=bool)
+        self._switched = np.zeros(count, dtype=np.intp)
 
     def go(self) -> tuple[Array, Mask]:
         """Through all of it."""
         waiting = self._begin()
         with np.errstate(all="ignore"):  # a lane that runs away is left to `simulate`
-            for _ in range(200):  # stretches up to a change of mode
+            for _ in range(2000):  # stretches up to a change of mode
                 if not waiting:
                     break
                 waiting = [following for group in joined(waiting) for following in self._stretch(group)]
@@ -198,6 +215,7 @@ class _VariantCourse:
                 np.full(lanes.size, ensemble.span[0]),
                 np.zeros((size, lanes.size)),
                 np.zeros(lanes.size),
+                np.zeros(lanes.size, dtype=bool),
             )
         ]
 
@@ -208,8 +226,9 @@ class _VariantCourse:
             return []
         p, program = equations.parameters(self.columns[:, group.lanes]), equations.code.program
         begin, ends, highs = equations.pieces(group.t, p, self.ensemble.span)
-        entry = equations.entered(begin, group.x, p)
-        following = self._past_guards(equations, group, entry.met)
+        entry = equations.entered(begin, group.x, p).but(group.settled)
+        nothing = np.zeros_like(entry.offsets)  # what contradicts modes at once is beyond its limit, whatever that is
+        following = self._past_guards(equations, group, begin, PhaseEntry(entry.met, nothing))
         on = entry.met == Met.NOTHING
         group, p = group.some(on), p[:, on]
         course = self._course(equations, group, p, entry.some(on), (begin[on], ends[on], highs[on]))
@@ -217,17 +236,30 @@ class _VariantCourse:
         for row, place in enumerate(program.integrated):
             self.values[place, group.lanes] += course.integrals[row]
         self.values[:, group.lanes] = np.where(self._extreme[:, None], course.best, self.values[:, group.lanes])
-        there, met = VariantGroup(group.modes, group.lanes, course.t, course.x, course.steps), course.met
+        there, met = replace(group.going_on(group.modes, course.t, course.x), steps=course.steps), course.met
         over = (met == Met.THE_END) & (course.t >= self.ensemble.span[1])
         self._end(equations, there, p, over)
-        onward = (met == Met.THE_END) & ~over | (met >= program.guards)  # in the same modes
-        met = np.where(met < program.guards, met, Met.NOTHING)
-        return [*following, there.some(onward), *self._past_guards(equations, there, met)]
+        self._switched[group.lanes[met >= program.guards]] += 1
+        switched = (met >= program.guards) & (self._switched[group.lanes] < 200)  # more of them come to no end
+        onward = (met == Met.THE_END) & ~over | switched  # in the same modes
+        ended = (met >= 0) & (met < program.guards)
+        left = PhaseEntry(np.where(ended, met, Met.NOTHING), entry.offsets[:, on])
+        return [*following, there.some(onward), *self._past_guards(equations, there, course.t, left)]
 
-    def _past_guards(self, equations: EnsembleEquations, group: VariantGroup, met: Index) -> list[VariantGroup]:
-        """Past the guards (k,) that lanes have met, where they have met one."""
-        guards = np.unique(met[met >= 0]).tolist()
-        return [new for guard in guards for new in self._changed(equations, group.some(met == guard), guard)]
+    def _past_guards(
+        self, equations: EnsembleEquations, group: VariantGroup, after: Array, entry: PhaseEntry
+    ) -> list[VariantGroup]:
+        """Past the guards that lanes have met, where they have met one: one by one where that takes more to tell."""
+        groups = [
+            new
+            for guard in np.unique(entry.met[entry.met >= 0]).tolist()
+            for new in self._past(equations, group.some(entry.met == guard), guard)
+        ]
+        changed = np.isin(group.lanes, [lane for new in groups for lane in new.lanes])
+        for k in np.flatnonzero((entry.met != Met.NOTHING) & ~changed):
+            new = self.ensemble.settled(group.some([k]), self.columns[:, group.lanes[k]], after[k], entry.some([k]))
+            groups += [] if new is None else [new]
+        return groups
 
     def _course(
         self, equations: EnsembleEquations, group: VariantGroup, p: Array, entry: PhaseEntry, pieces: Sequence[Array]
@@ -255,6 +287,11 @@ class _VariantCourse:
             met,
         )
 
+    def _past(self, equations: EnsembleEquations, group: VariantGroup, guard: int) -> list[VariantGroup]:
+        """Past a guard, the lanes in which what follows is beyond doubt."""
+        struck = self.ensemble.struck(group, guard, self.columns[:, group.lanes])
+        return struck or self._changed(equations, group, guard)
+
     def _changed(self, before: EnsembleEquations, group: VariantGroup, guard: int) -> list[VariantGroup]:
         """Past a guard: what is stored goes over to the equations that follow, where it goes over unchanged."""
         p = before.parameters(self.columns[:, group.lanes])
@@ -269,7 +306,7 @@ class _VariantCourse:
             for kind in after.code.kinds:
                 size = np.maximum(np.abs(old[kind]).max(axis=0, initial=0.0), 1.0)
                 same &= (np.abs(new[kind] - old[kind]) <= TYPED * size).all(axis=0)
-            groups.append(VariantGroup(modes, group.lanes[there], t, x, group.steps[there]).some(same))
+            groups.append(group.some(there).going_on(modes, t, x).some(same))
         return groups
 
     def _end(self, equations: EnsembleEquations, group: VariantGroup, p: Array, over: Mask) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -82,9 +82,13 @@ class PhaseEntry:
     met: Index
     offsets: Array
 
-    def some(self, on: Mask) -> PhaseEntry:
-        """Of the lanes (k,) that are marked."""
+    def some(self, on: Mask | Index) -> PhaseEntry:
+        """Of the lanes (k,) that are marked, or those that are named."""
         return PhaseEntry(self.met[on], self.offsets[:, on])
+
+    def but(self, settled: Mask) -> PhaseEntry:
+        """The same, where nothing contradicts the modes in lanes (k,) in which they are settled."""
+        return PhaseEntry(np.where(settled, Met.NOTHING, self.met), self.offsets)
 
 
 class EnsembleEquations:
@@ -162,6 +166,7 @@ class VariantGroup:
         t: (k,) s.
         x: (n, k) states.
         steps: (k,) lengths of their last steps, s.
+        settled: (k,) whether an event iteration has found the modes consistent with the motion that follows.
     """
 
     modes: ModeNames
@@ -169,10 +174,15 @@ class VariantGroup:
     t: Array
     x: Array
     steps: Array
+    settled: Mask
 
     def some(self, on: Mask | Index) -> VariantGroup:
         """Those of the lanes (k,) that are marked, or those that are named."""
-        return VariantGroup(self.modes, self.lanes[on], self.t[on], self.x[:, on], self.steps[on])
+        return VariantGroup(self.modes, self.lanes[on], self.t[on], self.x[:, on], self.steps[on], self.settled[on])
+
+    def going_on(self, modes: ModeNames, t: Array, x: Array, *, settled: bool = False) -> VariantGroup:
+        """The same variants in modes from times (k,) and states (n, k) on."""
+        return replace(self, modes=modes, t=t, x=x, settled=np.full(t.size, settled))
 
 
 def joined(groups: Sequence[VariantGroup]) -> list[VariantGroup]:
@@ -188,6 +198,7 @@ def joined(groups: Sequence[VariantGroup]) -> list[VariantGroup]:
             np.concatenate([one.t for one in several]),
             np.concatenate([one.x for one in several], axis=1),
             np.concatenate([one.steps for one in several]),
+            np.concatenate([one.settled for one in several]),
         )
         for modes, several in alike.items()
     ]

@@ -2,44 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cached_property
 from typing import cast
 
 import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array
-from shaftwork.hybrid.consistency import (
-    clear_of_limit,
-    drift,
-    moved_by_rounding,
-    rounding_moves,
-    side_of_limit,
-    time_scales,
-)
+from shaftwork.core.errors import CompileError, NetworkError, ParameterError, SimulationError
 from shaftwork.hybrid.equation_sets import EquationSets
 from shaftwork.hybrid.event_iteration import EventIteration
 from shaftwork.hybrid.hybrid_model import HybridModel
-from shaftwork.hybrid.modes.mode_equations import ModeEquations
+from shaftwork.hybrid.hybrid_state import HybridState
 from shaftwork.hybrid.modes.mode_machines import with_modes
 from shaftwork.hybrid.modes.starts import conditional
 from shaftwork.sweep.ensemble import Ensemble
 from shaftwork.sweep.ensemble_equations import (
-    EnsembleCode,
     EnsembleEquations,
     Mask,
     ModeNames,
     PhaseEntry,
     VariantGroup,
 )
-from shaftwork.sweep.lane_tables import Met
-
-Course = tuple[Array, Array, Array, Array]
-"""Times (k,), states (n, k), their rates, and guards (guards, k)."""
+from shaftwork.sweep.guarded_equations import GuardedEquations
+from shaftwork.sweep.impact_lanes import LaneImpact, hits_alone
 
 
 class HybridEnsemble(Ensemble):
     """Measures of many variants of a network whose parts change their mode; see `Ensemble`."""
+
+    @cached_property
+    def _impacts(self) -> dict[tuple[ModeNames, int], LaneImpact | None]:
+        """By modes and guard what is hit there, if it can be followed side by side."""
+        return {}
 
     @property
     def _equation_sets(self) -> EquationSets:
@@ -70,6 +65,46 @@ class HybridEnsemble(Ensemble):
         }
         return not symbols.isdisjoint(self.names)
 
+    def struck(self, group: VariantGroup, guard: int, columns: Array) -> list[VariantGroup]:
+        """Past a guard that is that of a rigid contact: the lanes in which what follows is beyond doubt."""
+        key = group.modes, guard
+        if key not in self._impacts:
+            self._impacts[key] = self._impact(*key)
+        impact = self._impacts[key]
+        try:
+            return [] if impact is None else impact.follow(group, columns)
+        except (CompileError, ParameterError):
+            self._impacts[key] = None
+            return []
+
+    def _impact(self, modes: ModeNames, guard: int) -> LaneImpact | None:
+        equations = self._guarded(modes)
+        met = [active for active in equations.kirchhoff.watched(modes) if active.guard == guard]
+        alone = len(met) == 1 and hits_alone(equations, met[0])
+        return LaneImpact(equations, met[0], self._guarded) if alone else None
+
+    def _guarded(self, modes: ModeNames) -> GuardedEquations:
+        """The equations of a combination of modes in which variants are followed.
+
+        Raises:
+            CompileError: they cannot run side by side in them.
+        """
+        equations = self.equations(modes)
+        if not isinstance(equations, GuardedEquations):
+            raise CompileError(str(self._equations[modes]))
+        return equations
+
+    def settled(self, one: VariantGroup, values: Array, after: float, entry: PhaseEntry) -> VariantGroup | None:
+        """A lane past what it has met, as the event iteration of a single run has it."""
+        named = dict(zip(self.names, values.tolist(), strict=True))
+        events, met = EventIteration(self._equation_sets, named, self.span), int(entry.met[0])
+        before = HybridState(events.transfer.regime(one.modes), one.x[:, 0], entry.offsets[:, 0].tolist())
+        try:
+            state, _ = events.run(float(one.t[0]), float(after), before, None if met < 0 else met)
+        except (SimulationError, NetworkError):  # which the run of this variant will tell
+            return None
+        return one.going_on(state.regime.modes, one.t, state.x[:, None], settled=True)
+
     def after(self, group: VariantGroup, guard: int, p: Array) -> list[tuple[ModeNames, Mask]]:
         """The modes to which a guard leads by itself, and the lanes (k,) that go there."""
         equations = self._equation_sets.of(group.modes)
@@ -84,68 +119,3 @@ class HybridEnsemble(Ensemble):
             names = [equations.start_of(number, before, *start) for start in starts]
         targets = dict.fromkeys(names)
         return [(with_modes(group.modes, {number: to}), np.array([name == to for name in names])) for to in targets]
-
-
-class GuardedEquations(EnsembleEquations):
-    """The equations of one combination of modes, with the guards that end these.
-
-    Args:
-        code: its programs.
-        equations: the equations with their guards.
-        modes: the combination.
-        base: the parameter vector of a variant, of which sizes are taken.
-        names: of the parameters that vary.
-        span: start and end of the motion, s.
-    """
-
-    def __init__(
-        self,
-        code: EnsembleCode,
-        equations: ModeEquations,
-        modes: ModeNames,
-        base: Array,
-        names: Sequence[str],
-        span: tuple[float, float],
-    ) -> None:
-        super().__init__(code, base, equations.sizes(base), names)
-        self.sides = equations.sides(modes)
-        self._tick, self._longest = time_scales(span)
-        self._moves = np.array(rounding_moves(self.sizes.tolist())).T[:, :, None]
-
-    def entered(self, t: Array, x: Array, p: Array) -> PhaseEntry:
-        """Whether every guard is on its own side, or on its limit and about to be, as `EventIteration` would find.
-
-        Args:
-            t: (k,) s.
-            x: (n, k) states.
-            p: (parameters, k).
-        """
-        if not len(self.sides):
-            return super().entered(t, x, p)
-        rates, now = self.code.motion(t, x, p)
-        moved = moved_by_rounding(x, rates, self._moves, self._tick)
-        near_rates, near = self.code.motion(t + self._tick, moved, p)
-        side, bands, step = self.sides[:, None], np.abs(near - now), self._step(rates)
-        excess, turns = side * now, np.zeros(now.shape, dtype=np.intp)
-        here, beside = (t, x, rates, now), (t + self._tick, moved, near_rates, near)
-        for _ in range(2):  # where nothing moves yet, its acceleration tells
-            here, beside = self._later(step, here, p), self._later(step, beside, p)
-            drifts = drift(side * (here[3] - now), side * (beside[3] - near), bands)
-            turns = np.where(turns == 0, drifts, turns)
-        where = side_of_limit(excess, bands)
-        beyond = ((where > 0) | ((where == 0) & (turns > 0))) & (self.sides != 0)[:, None]
-        count = beyond.sum(axis=0)
-        met = np.where(count == 0, Met.NOTHING, np.where(count == 1, beyond.argmax(axis=0), Met.A_LIMIT))
-        return PhaseEntry(met, clear_of_limit(excess, bands))
-
-    def _step(self, rates: Array) -> Array:
-        """(k,) how far in s the further course is looked at; see `Regime.ahead`."""
-        with np.errstate(divide="ignore"):
-            steps = (self._moves[3] / np.abs(rates)).min(axis=0)
-        return np.asarray(np.minimum(self._longest, steps))
-
-    def _later(self, step: Array, course: Course, p: Array) -> Course:
-        """A step further along a straight line."""
-        t, x, rates, _ = course
-        later = x + step * rates
-        return t + step, later, *self.code.motion(t + step, later, p)

@@ -98,12 +98,12 @@ class Coefficients:
         """Of the parameters that they contain."""
 
     def __call__(self, p: Array) -> Array:
-        """(branches,) coefficients; 0 for branches that have none.
+        """(branches,) coefficients for (parameters,), or (branches, k) for (parameters, k); 0 where there is none.
 
         Raises:
             ParameterError: one is too large or too small to compute with; names its part.
         """
-        values = np.zeros(self._size)
+        values = np.zeros((self._size, *p.shape[1:]))
         with np.errstate(all="ignore"):
             for group, function in self._groups:
                 values[group.branches] = function(*p[group.places])
@@ -111,11 +111,12 @@ class Coefficients:
         # 1e60 m counts to the fourth power.
         farthest = 1e100
         sizes = np.abs(values)
-        if (beyond := np.flatnonzero(~((values == 0) | ((sizes >= 1 / farthest) & (sizes <= farthest))))).size:
-            part = self._graph.part_of(int(beyond[0]))
+        beyond = np.argwhere(~((values == 0) | ((sizes >= 1 / farthest) & (sizes <= farthest))))
+        if beyond.size:
+            part = self._graph.part_of(int(beyond[0, 0]))
             raise ParameterError(
                 f"{type(part.component).__name__} '{part.name}': its values make an inertia, a stiffness or a damping "
-                f"of {values[beyond[0]]:.3g} in SI, the equations take sizes from {1 / farthest:g} to {farthest:g}. "
+                f"of {values[*beyond[0]]:.3g} in SI, the equations take sizes from {1 / farthest:g} to {farthest:g}. "
                 "Look for a value in a wrong unit."
             )
         return values

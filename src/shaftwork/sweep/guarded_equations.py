@@ -1,0 +1,115 @@
+"""The equations of one combination of modes for many variants, with the guards that end these."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from shaftwork.codegen.array_form.elements import Array
+from shaftwork.components.branches import ACROSS
+from shaftwork.core.errors import CompileError
+from shaftwork.hybrid.consistency import (
+    clear_of_limit,
+    drift,
+    moved_by_rounding,
+    rounding_moves,
+    side_of_limit,
+    time_scales,
+)
+from shaftwork.hybrid.modes.mode_equations import ModeEquations
+from shaftwork.sweep.ensemble_equations import EnsembleCode, EnsembleEquations, ModeNames, PhaseEntry
+from shaftwork.sweep.lane_tables import Met
+
+Course = tuple[Array, Array, Array, Array]
+"""Times (k,), states (n, k), their rates, and guards (guards, k)."""
+
+
+class GuardedEquations(EnsembleEquations):
+    """The equations of one combination of modes, with the guards that end these.
+
+    Args:
+        code: its programs.
+        equations: the equations with their guards.
+        modes: the combination.
+        base: the parameter vector of a variant, of which sizes are taken.
+        names: of the parameters that vary.
+        span: start and end of the motion, s.
+    """
+
+    def __init__(
+        self,
+        code: EnsembleCode,
+        equations: ModeEquations,
+        modes: ModeNames,
+        base: Array,
+        names: Sequence[str],
+        span: tuple[float, float],
+    ) -> None:
+        super().__init__(code, base, equations.sizes(base), names)
+        self.kirchhoff, self.modes, self.sides = equations, modes, equations.sides(modes)
+        self._tick, self._longest = time_scales(span)
+        self._moves = np.array(rounding_moves(self.sizes.tolist())).T[:, :, None]
+
+    def entered(self, t: Array, x: Array, p: Array) -> PhaseEntry:
+        """Whether every guard is on its own side, or on its limit and about to be, as `EventIteration` would find.
+
+        Args:
+            t: (k,) s.
+            x: (n, k) states.
+            p: (parameters, k).
+        """
+        if not len(self.sides):
+            return super().entered(t, x, p)
+        rates, now = self.code.motion(t, x, p)
+        moved = moved_by_rounding(x, rates, self._moves, self._tick)
+        near_rates, near = self.code.motion(t + self._tick, moved, p)
+        side, bands, step = self.sides[:, None], np.abs(near - now), self.step(rates)
+        excess, turns = side * now, np.zeros(now.shape, dtype=np.intp)
+        here, beside = (t, x, rates, now), (t + self._tick, moved, near_rates, near)
+        for _ in range(2):  # where nothing moves yet, its acceleration tells
+            here, beside = self._later(step, here, p), self._later(step, beside, p)
+            drifts = drift(side * (here[3] - now), side * (beside[3] - near), bands)
+            turns = np.where(turns == 0, drifts, turns)
+        where = side_of_limit(excess, bands)
+        beyond = ((where > 0) | ((where == 0) & (turns > 0))) & (self.sides != 0)[:, None]
+        count = beyond.sum(axis=0)
+        met = np.where(count == 0, Met.NOTHING, np.where(count == 1, beyond.argmax(axis=0), Met.A_LIMIT))
+        return PhaseEntry(met, clear_of_limit(excess, bands))
+
+    def bands(self, t: Array, x: Array, rates: Array, now: Array, p: Array) -> Array:
+        """(guards, k) how far rounding moves each guard."""
+        moved = moved_by_rounding(x, rates, self._moves, self._tick)
+        return np.abs(self.code.motion(t + self._tick, moved, p)[1] - now)
+
+    def slip(self, machine: int, guards: Array) -> Array:
+        """(k,) the speed across a machine that slips, of which it is a guard.
+
+        Raises:
+            CompileError: it is none.
+        """
+        for active in self.kirchhoff.watched(self.modes):
+            if active.machine == machine and active.leave.by_speed:
+                return active.side * (1.0 if active.leave.when == ACROSS else -1.0) * guards[active.guard]
+        raise CompileError("The speed across what slips is no guard.")
+
+    def taken_up(self, p: Array, stored: Array) -> Array:
+        """(n, k) the states that take up all that is stored, (stores, k), with the least change.
+
+        Raises:
+            CompileError: they depend on more than on what is stored and on inertias.
+        """
+        count = len(self.code.model.parameters)
+        return self.kirchhoff.stores.taken_up(self.kirchhoff.bound(p[:count, 0]), p[:count], stored)
+
+    def step(self, rates: Array) -> Array:
+        """(k,) how far in s the further course is looked at; see `Regime.ahead`."""
+        with np.errstate(divide="ignore"):
+            steps = (self._moves[3] / np.abs(rates)).min(axis=0)
+        return np.asarray(np.minimum(self._longest, steps))
+
+    def _later(self, step: Array, course: Course, p: Array) -> Course:
+        """A step further along a straight line."""
+        t, x, rates, _ = course
+        later = x + step * rates
+        return t + step, later, *self.code.motion(t + step, later, p)
