@@ -95,8 +95,8 @@ def compared(net: sw.Network, t_end: float, tolerance: float) -> Sweep:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NETWORKS)
 def test_what_switches_runs_side_by_side_as_by_itself(name: str) -> None:
-    # 1e-7: errors of the steps, at a tenth of rtol = 1e-8 each, through dozens of events; 1e-6: an impact at rest is told
-    # rounding hides them, at about a millionth of the speeds
+    # 1e-7: errors of the steps, at a tenth of rtol = 1e-8 each, through dozens of events; 1e-6: rebounds that end where
+    # rounding hides them do so at about a millionth of the speeds
     tolerance = 1e-6 if "rigid" in name else 1e-7
     fast = compared(NETWORKS[name](), 8.0 if name == "the crane" else 2.0, tolerance)
     assert fast.why == ""

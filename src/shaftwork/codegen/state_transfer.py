@@ -146,7 +146,7 @@ class StateTransfer:
             raise CompileError("What is stored goes over to these states in a way of its own for each variant.")
         coefficients = bound.program.assembly.coefficients(p)
         by_stores, _ = self._state_maps(coefficients.T, *_full(bound.part))
-        return np.einsum("kns,sk->nk", by_stores, stored)
+        return np.asarray(np.einsum("kns,sk->nk", by_stores, stored))
 
     def _state_maps(self, k: Array, loops: Array, cutsets: Array) -> tuple[Array, Array]:
         """(n, stores) and (n, m) what stores and inputs are multiplied by in the states that equations start with.

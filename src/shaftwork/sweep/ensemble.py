@@ -1,8 +1,9 @@
 """Many variants of one network at once, in lanes of compiled code: the fast way of a sweep.
 
 All variants run through the same phases side by side. Where a lane meets a guard, the mode that this guard leads to is
-taken if the motion in it is beyond doubt: what is stored goes over unchanged, and every guard of the new mode is on its
-own side or about to be. A variant of which anything else is true is left to `Model.simulate`, which settles it in full.
+taken if the motion in it is beyond doubt: what is stored goes over unchanged, or a rigid contact is hit alone, and
+every guard of the new mode is on its own side or about to be. Of anything else the event iteration of a single run
+tells what follows, for this lane alone. A variant that is stiff, or that comes to no end, is left to `Model.simulate`.
 """
 
 from __future__ import annotations
@@ -257,7 +258,8 @@ class _VariantCourse:
         ]
         changed = np.isin(group.lanes, [lane for new in groups for lane in new.lanes])
         for k in np.flatnonzero((entry.met != Met.NOTHING) & ~changed):
-            new = self.ensemble.settled(group.some([k]), self.columns[:, group.lanes[k]], after[k], entry.some([k]))
+            one, values = np.array([k]), self.columns[:, group.lanes[k]]
+            new = self.ensemble.settled(group.some(one), values, after[k], entry.some(one))
             groups += [] if new is None else [new]
         return groups
 
@@ -289,13 +291,20 @@ class _VariantCourse:
 
     def _past(self, equations: EnsembleEquations, group: VariantGroup, guard: int) -> list[VariantGroup]:
         """Past a guard, the lanes in which what follows is beyond doubt."""
+        p = equations.parameters(self.columns[:, group.lanes])
+        here = equations.code.program.points(group.t, group.x, p)
+        alone = equations.alone(guard, group.t, group.x, p, (here["rates"], here["guards"]))
+        group = group.some(alone)
+        if not group.lanes.size:
+            return []
         struck = self.ensemble.struck(group, guard, self.columns[:, group.lanes])
-        return struck or self._changed(equations, group, guard)
+        return struck or self._changed(equations, group, guard, (p[:, alone], here["stored"][:, alone]))
 
-    def _changed(self, before: EnsembleEquations, group: VariantGroup, guard: int) -> list[VariantGroup]:
+    def _changed(
+        self, before: EnsembleEquations, group: VariantGroup, guard: int, of_lanes: tuple[Array, Array]
+    ) -> list[VariantGroup]:
         """Past a guard: what is stored goes over to the equations that follow, where it goes over unchanged."""
-        p = before.parameters(self.columns[:, group.lanes])
-        stored, groups = before.code.program.points(group.t, group.x, p)["stored"], []
+        (p, stored), groups = of_lanes, list[VariantGroup]()
         for modes, there in self.ensemble.after(group, guard, p):
             after = self.ensemble.equations(modes)
             if after is None or not after.leaves_behind(before, guard):

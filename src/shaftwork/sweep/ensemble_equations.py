@@ -145,6 +145,10 @@ class EnsembleEquations:
         """Whether the modes are consistent with the motion in lanes (k,): without guards they are."""
         return PhaseEntry(np.full(t.size, Met.NOTHING), np.zeros((0, t.size)))
 
+    def alone(self, guard: int, t: Array, x: Array, p: Array, motion: tuple[Array, Array]) -> Mask:  # noqa: ARG002
+        """(k,) whether no other guard is near its limit where one is met; there is none."""
+        return np.ones(t.size, dtype=bool)
+
     def leaves_behind(self, before: EnsembleEquations, guard: int) -> bool:
         """Whether the guard by which these modes were entered is met no more; `entered` looks at all the others."""
         return before.code is not self.code or not self.sides[guard] == before.sides[guard] != 0.0

@@ -35,7 +35,7 @@ from shaftwork.sweep.sweep_result import VERDICTS, Limits, Sweep, limits_of
 from shaftwork.sweep.sweep_store import Store
 from shaftwork.sweep.sweep_task import Chunk, Index, Reader, Task, Worker, chunks
 
-LEFT = "a zero, an impact, a stiff motion or a change of mode that is not beyond doubt is left to `simulate`"
+LEFT = "a zero, a stiff motion, one without end or one that a law drives back to its jump is left to `simulate`"
 """Why variants have left those beside them."""
 
 

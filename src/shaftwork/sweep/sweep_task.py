@@ -238,7 +238,7 @@ class Worker:
 def _kind_of(model: Model) -> type[Ensemble]:
     """What runs variants of a network side by side."""
     if model.phased:
-        from shaftwork.sweep.hybrid_ensemble import HybridEnsemble
+        from shaftwork.sweep.switching.hybrid_ensemble import HybridEnsemble
 
         return HybridEnsemble
     from shaftwork.sweep.ensemble import Ensemble

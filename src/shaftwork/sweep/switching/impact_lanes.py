@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from sympy import Expr
@@ -18,13 +19,12 @@ from sympy import Expr
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.code import vectorised
 from shaftwork.components.branches import INTEGRAL
-from shaftwork.hybrid.consistency import CLEAR
 from shaftwork.hybrid.hybrid_state import slipping
 from shaftwork.hybrid.impacts.impact_contacts import lasting
 from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, ActiveGuard, GivesWay, limited, with_modes
 from shaftwork.numerics.tolerances import TYPED
 from shaftwork.sweep.ensemble_equations import Mask, ModeNames, VariantGroup
-from shaftwork.sweep.guarded_equations import GuardedEquations
+from shaftwork.sweep.switching.guarded_equations import GuardedEquations
 
 
 def hits_alone(equations: GuardedEquations, active: ActiveGuard) -> bool:
@@ -85,6 +85,30 @@ class _Instant:
         return self.motion[0][place] if place is not None else self.equations.slip(machine, self.motion[1])
 
 
+class _Hit(NamedTuple):
+    """An impact.
+
+    Args:
+        before: at the limit.
+        closed: with the contact closed.
+        back: with it open, and thrown back.
+        sure: (k,) where that is beyond doubt.
+        thrown: (k,) where it is fast enough to be thrown back.
+        late: (k,) how long ago it was, s.
+        beyond: (k,) how far the guard is beyond its limit.
+        loses: (k,) what a rebound takes of the square of the speed.
+    """
+
+    before: _Instant
+    closed: _Instant
+    back: _Instant
+    sure: Mask
+    thrown: Mask
+    late: Array
+    beyond: Array
+    loses: Array
+
+
 @dataclass(frozen=True, eq=False)
 class LaneImpact:
     """A rigid contact that is hit.
@@ -109,31 +133,35 @@ class LaneImpact:
         Raises:
             CompileError: they cannot be followed side by side.
         """
-        found, number = _Instant(self.equations, columns, group.t, group.x), self.active.machine
-        late, beyond = self._late(found)
-        hits = found.moved(-late)
-        before = hits.taken_to(self.equations_of(self._apart))
-        closed = before.taken_to(self.equations_of(with_modes(self._apart, {number: self.active.leave.to})))
-        stopped = closed.taken_to(before.equations)
-        share, rest = (
-            self._constant(constant, hits.p) for constant in (self.active.leave.rebound, self.active.leave.rest)
-        )
-        back = _Instant(before.equations, columns, group.t, before.x + (1 + share) * (stopped.x - before.x))
-        closing, groups = self._slope * hits.across(number), list[VariantGroup]()
-        thrown = closing * share > rest
-        sure = (closing > _least(hits)) & (np.abs(stopped.across(number)) <= TYPED * closing) & self._alone(hits)
-        for modes, there in self._ends(back, sure & thrown):
-            flies = back.taken_to(self.equations_of(modes), there)
-            loses = ((1 - share**2) * closing**2)[there]
-            stays = (loses > 0) & (loses < 4 * beyond[there] * self._pushed(flies))
-            thrown[there] = ~stays
-            new = group.some(there).going_on(modes, group.t[there], flies.moved(late[there]).x)
-            groups.append(new.some(~stays))
-        for modes, there in self._ends(closed, sure & ~thrown):
-            x, equations = closed.taken_to(self.equations_of(modes), there).x, self.equations_of(modes)
-            x[equations.kirchhoff.twist(number)] = self._limit(hits)[there]
-            groups.append(group.some(there).going_on(modes, group.t[there], x))
+        hit = self._hit(_Instant(self.equations, columns, group.t, group.x))
+        groups, stays = list[VariantGroup](), hit.sure & ~hit.thrown
+        for modes, there in self._ends(hit.back, hit.sure & hit.thrown):
+            flies = hit.back.taken_to(self.equations_of(modes), there)
+            # a rebound that would lose less than it gains, as it is found late by rounding, is none
+            last = (hit.loses[there] > 0) & (hit.loses[there] < 4 * hit.beyond[there] * self._pushed(flies))
+            stays[there] = last
+            new = group.some(there).going_on(modes, flies.t, flies.moved(hit.late[there]).x)
+            groups.append(new.some(~last))
+        for modes, there in self._ends(hit.closed, stays):
+            rests = hit.closed.taken_to(self.equations_of(modes), there)
+            rests.x[rests.equations.kirchhoff.twist(self.active.machine)] = self._limit(hit.before)[there]
+            groups.append(group.some(there).going_on(modes, rests.t, rests.x))
         return groups
+
+    def _hit(self, found: _Instant) -> _Hit:
+        """The impact of variants in which the guard is met."""
+        leave, number = self.active.leave, self.active.machine
+        late, beyond = self._late(found)
+        before = found.moved(-late)
+        apart = before.taken_to(self.equations_of(self._apart))
+        closed = apart.taken_to(self.equations_of(with_modes(self._apart, {number: leave.to})))
+        stopped = closed.taken_to(apart.equations)
+        share, rest = (self._constant(constant, before.p) for constant in (leave.rebound, leave.rest))
+        back = _Instant(apart.equations, found.columns, found.t, apart.x + (1 + share) * (stopped.x - apart.x))
+        closing = self._slope * before.across(number)
+        sure = (closing > _least(before)) & (np.abs(stopped.across(number)) <= TYPED * closing)
+        loses = (1 - share**2) * closing**2
+        return _Hit(before, closed, back, sure, closing * share > rest, late, beyond, loses)
 
     @cached_property
     def _rubbing(self) -> dict[int, GivesWay]:
@@ -168,13 +196,6 @@ class LaneImpact:
         number = self.active.machine
         return np.asarray(self._slope * (later.across(number) - flies.across(number)) / step)
 
-    def _alone(self, hits: _Instant) -> Mask:
-        """(k,) whether no other guard is near its limit."""
-        equations, now = self.equations, hits.motion[1]
-        bands = equations.bands(hits.t, hits.x, *hits.motion, hits.p)
-        others = [k for k in equations.watched if k != self.active.guard]
-        return np.asarray((equations.sides[others, None] * now[others] < -CLEAR * bands[others]).all(axis=0))
-
     def _ends(self, slipping: _Instant, there: Mask) -> Iterator[tuple[ModeNames, Mask]]:
         """The modes in which what rubs goes on, and the variants, of those that are marked, that do so."""
         combinations, least = [(slipping.equations.modes, there)], _least(slipping)
@@ -187,12 +208,12 @@ class LaneImpact:
             ]
         return ((modes, there) for modes, there in combinations if there.any())
 
-    def _constant(self, expression: Expr | None, p: Array) -> Array | float:
+    def _constant(self, expression: Expr | None, p: Array) -> Array:
         """What is made of the contact's parameters."""
         kirchhoff = self.equations.kirchhoff
         of_network = kirchhoff.of_machine(self.active.machine, expression)
         symbols, names = tuple(sorted(of_network.free_symbols, key=str)), [*kirchhoff.model.parameters]
-        return vectorised(symbols, of_network)(*(p[names.index(symbol.name)] for symbol in symbols))
+        return np.asarray(vectorised(symbols, of_network)(*(p[names.index(symbol.name)] for symbol in symbols)))
 
 
 def _least(instant: _Instant) -> Array:

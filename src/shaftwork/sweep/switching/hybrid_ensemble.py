@@ -24,8 +24,8 @@ from shaftwork.sweep.ensemble_equations import (
     PhaseEntry,
     VariantGroup,
 )
-from shaftwork.sweep.guarded_equations import GuardedEquations
-from shaftwork.sweep.impact_lanes import LaneImpact, hits_alone
+from shaftwork.sweep.switching.guarded_equations import GuardedEquations
+from shaftwork.sweep.switching.impact_lanes import LaneImpact, hits_alone
 
 
 class HybridEnsemble(Ensemble):

@@ -10,6 +10,7 @@ from shaftwork.codegen.array_form.elements import Array
 from shaftwork.components.branches import ACROSS
 from shaftwork.core.errors import CompileError
 from shaftwork.hybrid.consistency import (
+    CLEAR,
     clear_of_limit,
     drift,
     moved_by_rounding,
@@ -18,7 +19,7 @@ from shaftwork.hybrid.consistency import (
     time_scales,
 )
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
-from shaftwork.sweep.ensemble_equations import EnsembleCode, EnsembleEquations, ModeNames, PhaseEntry
+from shaftwork.sweep.ensemble_equations import EnsembleCode, EnsembleEquations, Mask, ModeNames, PhaseEntry
 from shaftwork.sweep.lane_tables import Met
 
 Course = tuple[Array, Array, Array, Array]
@@ -77,10 +78,28 @@ class GuardedEquations(EnsembleEquations):
         met = np.where(count == 0, Met.NOTHING, np.where(count == 1, beyond.argmax(axis=0), Met.A_LIMIT))
         return PhaseEntry(met, clear_of_limit(excess, bands))
 
-    def bands(self, t: Array, x: Array, rates: Array, now: Array, p: Array) -> Array:
-        """(guards, k) how far rounding moves each guard."""
-        moved = moved_by_rounding(x, rates, self._moves, self._tick)
-        return np.abs(self.code.motion(t + self._tick, moved, p)[1] - now)
+    def alone(self, guard: int, t: Array, x: Array, p: Array, motion: tuple[Array, Array]) -> Mask:
+        """(k,) whether a guard is met alone; of several at one instant, it takes more to tell which goes first.
+
+        Two contacts in a row that carry the same torque reach zero together: one of them opens, and the other stays.
+        """
+        others = self._beside(guard)
+        if not others:
+            return super().alone(guard, t, x, p, motion)
+        rates, now = motion
+        near = self.code.motion(t + self._tick, moved_by_rounding(x, rates, self._moves, self._tick), p)[1]
+        within = self.sides[others, None] * now[others] < -CLEAR * np.abs(near - now)[others]
+        return np.asarray(within.all(axis=0))
+
+    def _beside(self, guard: int) -> list[int]:
+        """The guards that change what follows another one: of impacts all, and of what a torque ends the same kind."""
+        watched = self.kirchhoff.watched(self.modes)
+        met = [active.leave for active in watched if active.guard == guard]
+        hits, by_torque = (
+            any(of) for of in zip(*((one.rebound is not None, one.by_torque) for one in met), strict=True)
+        )
+        others = {active.guard for active in watched if hits or (by_torque and active.leave.by_torque)}
+        return sorted(others - {guard})
 
     def slip(self, machine: int, guards: Array) -> Array:
         """(k,) the speed across a machine that slips, of which it is a guard.
@@ -90,7 +109,7 @@ class GuardedEquations(EnsembleEquations):
         """
         for active in self.kirchhoff.watched(self.modes):
             if active.machine == machine and active.leave.by_speed:
-                return active.side * (1.0 if active.leave.when == ACROSS else -1.0) * guards[active.guard]
+                return np.asarray(active.side * (1.0 if active.leave.when == ACROSS else -1.0) * guards[active.guard])
         raise CompileError("The speed across what slips is no guard.")
 
     def taken_up(self, p: Array, stored: Array) -> Array:
