@@ -68,7 +68,7 @@ JOINS = {
     "hybrid": (
         "shaftwork.waves.hybrid_wave_model",
         "shaftwork.waves.hybrid_waves",
-        "shaftwork.sweep.switching.hybrid_ensemble",
+        "shaftwork.sweep.switching",
         "shaftwork.stepper.hybrid_moments",
         "shaftwork.ccode.mode_tables",
     ),

@@ -143,7 +143,7 @@ class LaneImpact:
             new = group.some(there).going_on(modes, flies.t, flies.moved(hit.late[there]).x)
             groups.append(new.some(~last))
         for modes, there in self._ends(hit.closed, stays):
-            rests = hit.closed.taken_to(self.equations_of(modes), there)
+            rests = hit.closed.taken_to(self.equations_of(modes), there).moved(hit.late[there])
             rests.x[rests.equations.kirchhoff.twist(self.active.machine)] = self._limit(hit.before)[there]
             groups.append(group.some(there).going_on(modes, rests.t, rests.x))
         return groups
