@@ -68,7 +68,8 @@ NETWORKS: Mapping[str, Callable[[], sw.Network]] = {
     "a pulse": lambda: train(60 * sympy.exp(-((20 * sw.t - 10) ** 2))),
     "a law that fades": lambda: train(60 - 20 * sympy.tanh(5 * (sw.omega - 1))),
     "a rigid gap": lambda: train(SWINGING, shaft=RIGID),
-    "a rigid gap, a brake and a friction": lambda: with_parts(train(SWINGING, shaft=RIGID), BRAKE, FRICTION),
+    "a rigid gap and a friction": lambda: with_parts(train(SWINGING, shaft=RIGID), FRICTION),
+    "a rigid gap and a brake": lambda: with_parts(train(sympy.Float(60), shaft=RIGID), BRAKE),
     "a rigid gap behind a gear": lambda: train(SWINGING, gear=True, shaft=RIGID),
     "a rigid gap and a stop": lambda: with_parts(
         train(SWINGING, shaft=RIGID), sw.HardStop("stop", upper=0.3, lower=-0.1, restitution=0.5)
