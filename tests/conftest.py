@@ -17,8 +17,7 @@ for library in ("OMP", "OPENBLAS", "MKL"):
 # Who runs the tests in the background of a script ignores Ctrl-C, and so would they and the commands that they start.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-HEYOKA = importlib.util.find_spec("heyoka") is not None
-if HEYOKA:
+if importlib.util.find_spec("heyoka") is not None:
     import heyoka
 
     # Thousands of random networks are compiled once each: they are not worth keeping, on disk or in memory.
@@ -46,10 +45,15 @@ settings.load_profile("random networks")
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Random networks run without the coverage tool: it would double their time, and other tests reach every line.
 
-    Where there is no heyoka, what names it as an engine is skipped.
+    What says something of an engine that is not installed is skipped: by a parameter, or by the mark of heyoka.
     """
+    from shaftwork.integrate.engines import ENGINES
+
+    missing = {name for name, entry in ENGINES.items() if not entry.installed}
     for item in items:
         if getattr(getattr(item, "function", None), "is_hypothesis_test", False):
             item.add_marker("no_cover")
-        if not HEYOKA and "heyoka" in map(str, getattr(getattr(item, "callspec", None), "params", {}).values()):
-            item.add_marker(pytest.mark.skip(reason="heyoka is not installed"))
+        parameters = map(str, getattr(getattr(item, "callspec", None), "params", {}).values())
+        marks = (mark.name for mark in item.iter_markers())
+        for engine in missing.intersection((*parameters, *marks)):
+            item.add_marker(pytest.mark.skip(reason=f"the engine {engine} is not installed"))

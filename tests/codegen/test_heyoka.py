@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import heyoka
 import numpy as np
 import pytest
 import sympy
@@ -16,6 +15,8 @@ from shaftwork.core.errors import CompileError, MissingExtraError
 from shaftwork.integrate import scipy_ivp
 from shaftwork.integrate.problem import Problem
 from shaftwork.integrate.taylor import heyoka_taylor
+
+heyoka = pytest.importorskip("heyoka")
 
 x, v, t, a, b = sympy.symbols("x v t a b", real=True)
 

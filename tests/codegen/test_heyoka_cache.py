@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("heyoka")
+pytestmark = pytest.mark.heyoka
 
 PROGRAM = """
 import shaftwork as sw

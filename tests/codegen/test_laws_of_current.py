@@ -29,7 +29,6 @@ def series() -> sw.Network:
 
 @pytest.mark.parametrize("engine", ["scipy", "heyoka", "sundials"])
 def test_a_current_over_voltage_moves_as_a_speed_over_torque(engine: str) -> None:
-    pytest.importorskip({"heyoka": "heyoka", "sundials": "sksundae"}.get(engine, "scipy"))
     wanted, found = (
         net.simulate(3.0, rtol=1e-10, engine=engine, t_eval=31, initial=start)
         for net, start in ((train(), {"weight.phi": 0.5}), (series(), {"weight.q": 0.5}))

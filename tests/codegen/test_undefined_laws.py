@@ -178,8 +178,6 @@ def test_a_motion_into_a_pole_ends_in_an_error_and_goes_through_by_no_engine(eng
 
     Without the pole phi = 10 (t - 1 + e^-t) comes to 5 where t + e^-t = 1.5, at t = 1.1983 s.
     """
-    if engine == "heyoka":
-        pytest.importorskip("heyoka")
     net = wheel(sw.TorqueSource("pull", tau=10 + 0.001 / (sw.phi - 5)), sw.Damper("d", d=1.0))
     with pytest.raises(
         sw.SimulationError, match=r"failed at t = 1\.198.*(spacing of|spacing between) numbers.*J\.omega"

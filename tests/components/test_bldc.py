@@ -49,7 +49,6 @@ CASES = [{}, {"flat": 1.8}, {"dead_time": 1e-4}]
 @pytest.mark.parametrize("engine", ["scipy", "heyoka", "sundials"])
 def test_every_engine_follows_the_motor_written_by_hand(engine: str, changed: dict[str, float]) -> None:
     """Run-up from rest through some hundred commutations, diodes and open phases included."""
-    pytest.importorskip({"heyoka": "heyoka", "sundials": "sksundae"}.get(engine, "scipy"))
     t, x, _ = _truth(**changed)
     sol = _model(**changed).simulate(END, rtol=1e-10, engine=engine, t_eval=t)
     names = ("m.i_a", "m.i_b", "m.i_c", "J.omega")
@@ -215,7 +214,6 @@ CONTROL = {"i_ref": 8.0, "k_p": 15.0, "t_i": 0.004, "f_c": 1500.0}
 
 @pytest.mark.parametrize("engine", [pytest.param("scipy", marks=pytest.mark.slow), "heyoka"])
 def test_a_controlled_current_is_that_of_its_chopper_by_hand(engine: str) -> None:
-    pytest.importorskip({"heyoka": "heyoka"}.get(engine, "scipy"))
     net = sw.Network("locked")
     net.add(sw.BLDCMotor("m", **DATA, **CONTROL), "rotor")
     net.add(sw.SpeedSource("lock", omega=0.0), "rotor", "ground")
@@ -301,7 +299,6 @@ def test_pulses_of_a_share_of_the_time_give_that_share_of_the_voltage() -> None:
 @pytest.mark.parametrize("engine", ["heyoka", "scipy"])
 @pytest.mark.parametrize(("duty", "frequency"), [(0.3, 1e3), (0.3, 2e3), (0.5, 500.0)])
 def test_pulses_at_a_coil_are_exponentials_from_edge_to_edge(engine: str, duty: float, frequency: float) -> None:
-    pytest.importorskip(engine)
     net = sw.Network("coil")
     net.add(sw.VoltageSource("supply", u=100 * sw.PWM(duty, frequency)), "p", "ground")
     net.add(sw.Resistor("R", R=1.0), "p", "q")

@@ -81,7 +81,6 @@ def _by_hand(t: float, x: np.ndarray) -> list[float]:
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ["scipy", "heyoka"])
 def test_a_start_from_rest_follows_the_space_vector_equations(engine: str) -> None:
-    pytest.importorskip("heyoka" if engine == "heyoka" else "scipy")
     net = sw.Network("direct start")
     net.add(sw.InductionMachine("m", **DATA, R_s=R_S, t_on=0.02), "rotor")
     net.add(sw.Inertia("J", J=J), "rotor")

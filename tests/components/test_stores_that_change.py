@@ -303,7 +303,6 @@ class Cam(sw.Component):
 
 @pytest.mark.parametrize("engine", ["scipy", "heyoka", "sundials"])
 def test_a_capacity_in_parameters_is_that_of_the_same_law_in_numbers(engine: str) -> None:
-    pytest.importorskip("sksundae" if engine == "sundials" else engine)
 
     def net(part: sw.Component) -> sw.Network:
         made = sw.Network("cam")
@@ -335,7 +334,6 @@ def test_a_capacity_in_parameters_is_that_of_the_same_law_in_numbers(engine: str
     ],
 )
 def test_an_inertia_that_is_not_above_zero_stops_the_motion_there(engine: str, law: sympy.Expr, said: str) -> None:
-    pytest.importorskip(engine)
     net = sw.Network("wrong")
     net.add(sw.Inertia("arm", J=law), "a")
     start = {"arm.omega": 1.0} | ({"arm.phi": 5.0} if law.has(sw.phi) else {})
@@ -347,7 +345,6 @@ def test_an_inertia_that_is_not_above_zero_stops_the_motion_there(engine: str, l
 @pytest.mark.parametrize("ratio", [1.0, 2.0])
 def test_an_inertia_below_zero_beside_another_one_is_found_between_steps(engine: str, ratio: float) -> None:
     """J = 0.999 + sin(phi) is below zero within 0.045 of 3 pi / 2; its crossing is told, not the end of a step."""
-    pytest.importorskip({"sundials": "sksundae"}.get(engine, engine))
     net = sw.Network("beside")
     net.add(sw.TorqueSource("motor", tau=3.0), "a")
     net.add(sw.Inertia("heavy", J=5.0), "a")

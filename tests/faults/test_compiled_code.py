@@ -12,7 +12,7 @@ from random import Random
 
 import pytest
 
-pytest.importorskip("heyoka")
+pytestmark = pytest.mark.heyoka
 
 PROGRAM = """
 import shaftwork as sw

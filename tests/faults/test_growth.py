@@ -41,10 +41,10 @@ def test_many_calls_leave_neither_memory_nor_files_behind(what: str) -> None:
     ids=["smooth", "switching", "fading", "counting"],
 )
 @pytest.mark.slow
+@pytest.mark.heyoka
 @pytest.mark.parametrize("sticks", [False, True])
 def test_of_a_model_that_is_gone_no_compiled_code_stays(law: sympy.Expr, sticks: bool) -> None:  # noqa: FBT001
     """What its events call must not lead back to it."""
-    pytest.importorskip("heyoka")
     gc.collect()
     before = integrators()
     net = train(sticks=sticks)

@@ -112,9 +112,9 @@ def test_threads_read_one_motion_as_one_does() -> None:
             assert list(pool.map(told, [motion] * 16)) == [alone] * 16
 
 
+@pytest.mark.heyoka
 def test_a_run_within_a_run_leaves_it_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     """What `progress` calls may simulate the same model."""
-    pytest.importorskip("heyoka")
     monkeypatch.setattr(
         "shaftwork.integrate.taylor.heyoka_taylor.UNINTERRUPTED", 12
     )  # else a run so short has no time for it

@@ -191,8 +191,15 @@ def test_a_unit_is_printed_as_a_function_and_has_no_c_code(spring: Path, tmp_pat
     for refused in (net.compile().to_c, lambda folder: net.compile().to_fmu(folder / "unit.fmu")):
         with pytest.raises(sw.CompileError, match="is an FMU, of which there is no C code"):
             refused(tmp_path)
-    with pytest.raises(sw.SimulationError, match="has another law"):
-        net.simulate(0.1, engine="heyoka")
+
+
+@pytest.mark.parametrize(
+    ("engine", "error", "said"),
+    [("heyoka", sw.SimulationError, "has another law"), ("numba", sw.ParameterError, "functions of your own")],
+)
+def test_no_engine_in_machine_code_takes_a_unit(spring: Path, engine: str, error: type[Exception], said: str) -> None:
+    with pytest.raises(error, match=said):
+        with_spring(spring).simulate(0.1, engine=engine)
 
 
 def test_no_model_file_holds_a_unit(spring: Path, tmp_path: Path) -> None:

@@ -474,7 +474,6 @@ def test_an_engine_does_not_follow_the_rounding_of_a_torque_that_is_zero(engine:
 @pytest.mark.parametrize("engine", ["heyoka", "scipy"])
 def test_a_brake_whose_torque_grows_with_the_angle_stops_and_holds(engine: str) -> None:
     """J omega' = 1 up to t = 1, then 1 - (5 + phi) with phi from the first motion, until rest."""
-    pytest.importorskip(engine)
     net = sw.Network("brake")
     net.add(sw.Inertia("wheel", J=2.0), "s")
     net.add(sw.Brake("brake", tau=5 + sw.phi, t_on=1.0), "s")

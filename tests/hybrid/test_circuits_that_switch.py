@@ -110,7 +110,8 @@ def test_a_switch_is_closed_from_the_start_wherever_its_diode_stands(
 def test_a_switch_that_closes_takes_the_current_over_from_a_diode() -> None:
     sol = buck(("supply", "switch", "diode", "L", "R"), t_on=0.01).simulate(0.03, initial={"L.i": 10.0})
     assert sol["L.i"][-1] == pytest.approx(rising(rising(10.0, 0.01, 0.0), 0.02), rel=CLOSE)
-    assert sol.energy.lost_in["switch"] == sol.energy.lost_in["diode"] == 0.0
+    # but for rounding of what the coil stores, 0.2 J
+    assert [sol.energy.lost_in[name] for name in ("switch", "diode")] == pytest.approx([0.0, 0.0], abs=1e-15)
 
 
 @pytest.mark.parametrize("diodes", [(), ("high", "low")])

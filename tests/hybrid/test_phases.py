@@ -20,6 +20,7 @@ from shaftwork.hybrid.hybrid_run import HybridRun
 from shaftwork.hybrid.hybrid_state import HybridState
 from shaftwork.hybrid.in_place_events import InPlaceEvents
 from shaftwork.integrate.problem import SeriesError
+from shaftwork.integrate.taylor import heyoka_taylor
 
 ENGINES = ("heyoka", "scipy", "sundials")
 
@@ -416,14 +417,13 @@ def test_a_motion_is_freed_with_its_last_holder(engine: str) -> None:
         gc.enable()
 
 
+@pytest.mark.heyoka
 @pytest.mark.parametrize("load", [sw.CoulombLoad("load", tau=1.0), sw.Damper("load", d=1.0)], ids=["phases", "none"])
 def test_a_motion_is_not_run_again_for_what_nobody_asks(load: sw.Component, monkeypatch: pytest.MonkeyPatch) -> None:
-    heyoka = pytest.importorskip("shaftwork.integrate.taylor.heyoka_taylor")
-
     def refuse(_: object) -> None:
         raise AssertionError("the motion is run again")
 
-    monkeypatch.setattr(heyoka._TaylorReplay, "_segments", property(refuse))
+    monkeypatch.setattr(heyoka_taylor._TaylorReplay, "_segments", property(refuse))
     net = sw.Network("drive")
     net.add(sw.TorqueSource("motor", tau=2.0), "a")
     net.add(sw.Inertia("J", J=1.0), "a")

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from shaftwork.integrate import choice
-from shaftwork.integrate.engines import ENGINES, EngineEntry
+from shaftwork.integrate.engines import ENGINES, EngineEntry, available
 from shaftwork.integrate.problem import TOLERATED, UNSURPRISING
 from tests.integrate import step_doubling
 from tests.integrate.conftest import Case
@@ -88,7 +88,7 @@ def test_auto_asks_an_engine_for_special_systems_whether_it_suits(
     monkeypatch.setitem(sys.modules, "shaftwork.integrate.step_doubling", step_doubling)
     monkeypatch.setattr(step_doubling, "suits", lambda problem: f"It has {problem.x0.size} states.", raising=False)
     problem = replace(oscillator.problem, linear=None)
-    for asked_beyond, engine in ((1, "rk4"), (2, "heyoka")):
+    for asked_beyond, engine in ((1, "rk4"), (2, "heyoka" if available("heyoka") else "scipy")):
         entry = EngineEntry(module="step_doubling", method="", suited="", special=True, asked_beyond=asked_beyond)
         monkeypatch.setitem(ENGINES, "rk4", entry)
         assert choice.choose(problem)[0] == engine

@@ -42,12 +42,14 @@ def test_a_derivative_that_is_not_a_number_is_named(engine):
         choice.solve(problem(lambda _t, x: np.sqrt(1.0 - x) + 1.0), engine)
 
 
+@pytest.mark.heyoka
 def test_heyoka_names_time_and_state_of_a_motion_that_runs_away():
     x = sympy.Symbol("x")
     with pytest.raises(SimulationError, match=r"heyoka engine failed at t = 1\.5707.*not finite.*'motor.omega'"):
         choice.solve(symbolic(x**2 + 1, 0.0), "heyoka")
 
 
+@pytest.mark.heyoka
 def test_heyoka_says_that_a_motion_sticks_instead_of_going_on_wrongly():
     x = sympy.Symbol("x")
     with pytest.raises(SimulationError, match=r"from t = 0\.66666.*sticks where the condition x > 0 changes"):
@@ -101,6 +103,7 @@ def test_the_exact_engine_refuses_what_is_not_linear_or_not_straight(oscillator)
         choice.solve(replace(oscillator.problem, linear=bent), "exact")
 
 
+@pytest.mark.heyoka
 def test_heyoka_asks_for_a_program(oscillator):
     with pytest.raises(SimulationError, match="heyoka compiles small networks"):
         choice.solve(replace(oscillator.problem, symbolic=None), "heyoka")

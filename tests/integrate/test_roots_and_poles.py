@@ -65,6 +65,7 @@ def test_no_engine_steps_over_a_pole_of_the_time(law: sympy.Expr, engine: str) -
         coasting(law).simulate(2.0, engine=engine)
 
 
+@pytest.mark.heyoka
 def test_heyoka_alone_says_what_its_series_does_not_show() -> None:
     with pytest.raises(SeriesError, match="a root or a pole that a Taylor series does not show"):
         coasting(-(sympy.Abs(w) ** 0.75)).simulate(6.0, initial={"J.omega": 1.0}, engine="heyoka")
@@ -72,7 +73,10 @@ def test_heyoka_alone_says_what_its_series_does_not_show() -> None:
 
 @pytest.mark.slow
 def test_a_root_in_one_phase_of_several_is_followed_or_refused_and_no_motion_ends_early() -> None:
-    """Released from the clutch at 1 s, the wheel comes to rest at 3 s: it is followed up to there."""
+    """Released from the clutch at 1 s, the wheel comes to rest at 3 s: it is followed up to there, and rests then.
+
+    Engines that step over the infinite slope of the law at rest say so.
+    """
 
     def run(t_end: float) -> sw.Solution:
         net = coasting(-sympy.sqrt(sympy.Abs(w)) * sympy.sign(w))
@@ -83,8 +87,12 @@ def test_a_root_in_one_phase_of_several_is_followed_or_refused_and_no_motion_end
     sol = run(2.5)
     assert sol.steps[-1] == sol.t[-1] == 2.5
     assert sol.at([2.5])["J.omega"][0] == pytest.approx(0.25**2, rel=1e-6)
-    with pytest.raises(sw.SimulationError, match=r"failed at t = 3\.0"):
-        run(5.0)
+    try:
+        rested = run(3.5)
+    except sw.SimulationError as failed:
+        assert "failed at t = 3.0" in str(failed)  # noqa: PT017 (engines differ)
+    else:
+        assert abs(rested["J.omega"][-1]) < 1e-8
 
 
 @pytest.mark.slow

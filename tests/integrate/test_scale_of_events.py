@@ -10,7 +10,7 @@ from scipy.special import ive
 
 import shaftwork as sw
 
-pytest.importorskip("heyoka")
+pytestmark = pytest.mark.heyoka
 
 # Limits are met where they are beyond zero by more than rounding moves them, here within 2e-10 s.
 EVENT = 1e-9

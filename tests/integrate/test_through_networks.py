@@ -100,6 +100,7 @@ def test_auto_goes_on_with_scipy_where_a_law_has_no_taylor_series(tau: object) -
     assert np.array_equal(sol["J.omega"], reference["J.omega"])
 
 
+@pytest.mark.heyoka
 @pytest.mark.parametrize("tau", ROUGH, ids=str)
 def test_heyoka_when_asked_for_names_a_time_that_it_has_reached(tau: object, capfd: pytest.CaptureFixture[str]) -> None:
     said = r"failed at t = 0 s(: tau = .* of TorqueSource 'm' has a value there|.*not finite.*J\.omega' = 0 )"

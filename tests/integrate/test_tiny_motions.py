@@ -82,6 +82,7 @@ def heavy(factor: float, engine: str, rtol: float) -> np.ndarray:
     return np.column_stack([sol[f"J{number}.omega"] for number in (1, 2, 3, 4)])
 
 
+@pytest.mark.heyoka
 @pytest.mark.parametrize("factor", [1e6, 1e10])
 def test_speeds_beside_huge_torques_are_as_right_as_beside_small_ones(factor: float) -> None:
     """heyoka has one tolerance for all states: 1e-6 was lost beside torques of 1e8 N m, 1e-9 beside those of 1e6."""

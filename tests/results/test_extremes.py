@@ -91,6 +91,4 @@ def test_an_extreme_far_below_its_modes_is_right_to_their_rounding() -> None:
 @pytest.mark.parametrize(("engine", "most", "right"), [("scipy", 40, STEPPED), ("heyoka", 20, RIGHT)])
 @given(seed=st.integers(0, 2**32 - 1))
 def test_extremes_of_linear_trains_do_not_depend_on_the_engine(seed: int, engine: str, most: int, right: float) -> None:
-    if engine == "heyoka":
-        pytest.importorskip("heyoka")
     check_extremes(seed, most, engine, right)

@@ -38,8 +38,6 @@ def first_peak(damping: float) -> float:
 )
 @pytest.mark.parametrize("frequency", [500.0, 513.7])
 def test_a_peak_between_samples_is_told_with_a_number_of_outputs_that_show_it(engine: str, frequency: float) -> None:
-    if engine == "heyoka":
-        pytest.importorskip("heyoka")
     model, damping = shaft(frequency, 0.02).compile(), 0.02
     sol = model.simulate(2.0, engine=engine, t_eval=201, rtol=1e-10)
     assert sol["shaft.tau_c"].max() < 0.8 * first_peak(damping)

@@ -14,8 +14,6 @@ from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
-import heyoka
-
 from shaftwork.core.files import replaced
 
 ROOM = 2**25
@@ -31,6 +29,8 @@ _COLUMNS = "hash, bitcode, comp_flag, env_fingerprint, opt_bc, opt_ir, obj"
 
 def keep_apart() -> None:
     """Keep compiled code in a folder of our own beside heyoka's, or nowhere where no folder can be made."""
+    import heyoka
+
     state = heyoka.llvm_state
     state.set_memcache_limit(min(MEMORY, state.get_memcache_limit()))
     path = state.get_diskcache_path()

@@ -142,7 +142,7 @@ def _first_step(system, t, x, slope, limits, atol, rtol, y, other):  # type: ign
         bend += ((other[i] - slope[i]) / (atol[i] + rtol * abs(x[i]))) ** 2
     largest = max(speed, math.sqrt(bend / n) / guess)
     step = max(1e-6, 1e-3 * guess) if largest <= 1e-15 else (0.01 / largest) ** 0.125
-    return min(100 * guess, step, limits[3])
+    return max(min(100 * guess, step, limits[3]), 20 * EPS * abs(t))  # a state near zero is short of time alone
 
 
 @inner
