@@ -135,18 +135,24 @@ class StateTransfer:
             x += by_inputs @ bound.program.inputs.sources(t, x, bound.p)
         return np.asarray(x)
 
-    def taken_up(self, bound: BoundArrays, p: Array, stored: Array) -> Array:
-        """(n, k) the states that the equations start with, for parameters (parameters, k) and all stored (stores, k).
+    @cached_property
+    def by_inertias(self) -> bool:
+        """Whether the states that the equations start with follow from what is stored, by inertias alone."""
+        return not (self._form.dependent_through or self._form.across_inputs)
 
-        Raises:
-            CompileError: they depend on more than on what is stored and on inertias.
+    def taken_up(self, bound: BoundArrays, p: Array, stored: Array) -> Array:
+        """(n, k) the states that equations start with which are `by_inertias`.
+
+        Args:
+            bound: the equations with their parameters, of which the ratios are taken.
+            p: (parameters, k).
+            stored: (stores, k) all that was stored.
         """
-        form, gains = self._form, {*bound.program.assembly.loops.places, *bound.program.assembly.cutsets.places}
-        if form.dependent_through or form.across_inputs or (p[sorted(gains)] != bound.p[sorted(gains), None]).any():
-            raise CompileError("What is stored goes over to these states in a way of its own for each variant.")
-        coefficients = bound.program.assembly.coefficients(p)
-        by_stores, _ = self._state_maps(coefficients.T, *_full(bound.part))
-        return np.asarray(np.einsum("kns,sk->nk", by_stores, stored))
+        by_stores, _ = self._state_maps(bound.program.assembly.coefficients.of(p).T, *_full(bound.part))
+        x = np.zeros((by_stores.shape[1], stored.shape[1]))
+        for store, values in enumerate(stored):  # one after the other: the sum of a network is that of it alone
+            x += by_stores[:, :, store].T * values
+        return x
 
     def _state_maps(self, k: Array, loops: Array, cutsets: Array) -> tuple[Array, Array]:
         """(n, stores) and (n, m) what stores and inputs are multiplied by in the states that equations start with.

@@ -97,26 +97,30 @@ class Coefficients:
         self.places = {place for group, _ in self._groups for place in group.places.ravel().tolist()}
         """Of the parameters that they contain."""
 
-    def __call__(self, p: Array) -> Array:
-        """(branches,) coefficients for (parameters,), or (branches, k) for (parameters, k); 0 where there is none.
-
-        Raises:
-            ParameterError: one is too large or too small to compute with; names its part.
-        """
+    def of(self, p: Array) -> Array:
+        """Coefficients for (parameters,) or, (branches, k), for (parameters, k); 0 for branches that have none."""
         values = np.zeros((self._size, *p.shape[1:]))
         with np.errstate(all="ignore"):
             for group, function in self._groups:
                 values[group.branches] = function(*p[group.places])
+        return values
+
+    def __call__(self, p: Array) -> Array:
+        """(branches,) coefficients for (parameters,).
+
+        Raises:
+            ParameterError: one is too large or too small to compute with; names its part.
+        """
+        values = self.of(p)
         # Beyond it products of a few coefficients leave the range of floating-point numbers: the diameter of a shaft of
         # 1e60 m counts to the fourth power.
         farthest = 1e100
         sizes = np.abs(values)
-        beyond = np.argwhere(~((values == 0) | ((sizes >= 1 / farthest) & (sizes <= farthest))))
-        if beyond.size:
-            part = self._graph.part_of(int(beyond[0, 0]))
+        if (beyond := np.flatnonzero(~((values == 0) | ((sizes >= 1 / farthest) & (sizes <= farthest))))).size:
+            part = self._graph.part_of(int(beyond[0]))
             raise ParameterError(
                 f"{type(part.component).__name__} '{part.name}': its values make an inertia, a stiffness or a damping "
-                f"of {values[*beyond[0]]:.3g} in SI, the equations take sizes from {1 / farthest:g} to {farthest:g}. "
+                f"of {values[beyond[0]]:.3g} in SI, the equations take sizes from {1 / farthest:g} to {farthest:g}. "
                 "Look for a value in a wrong unit."
             )
         return values

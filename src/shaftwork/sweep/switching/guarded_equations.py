@@ -118,8 +118,11 @@ class GuardedEquations(EnsembleEquations):
         Raises:
             CompileError: they depend on more than on what is stored and on inertias.
         """
-        count = len(self.code.model.parameters)
-        return self.kirchhoff.stores.taken_up(self.kirchhoff.bound(p[:count, 0]), p[:count], stored)
+        stores, bound = self.kirchhoff.stores, self.kirchhoff.bound(self._base)
+        ratios = bound.program.assembly.loops.places | bound.program.assembly.cutsets.places
+        if not (stores.by_inertias and ratios.isdisjoint(place for place, _ in self._places)):
+            raise CompileError("What is stored goes over to these states in a way of its own for each variant.")
+        return stores.taken_up(bound, p[: len(self.code.model.parameters)], stored)
 
     def step(self, rates: Array) -> Array:
         """(k,) how far in s the further course is looked at; see `Regime.ahead`."""

@@ -9,7 +9,7 @@ from typing import cast
 import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array
-from shaftwork.core.errors import CompileError, NetworkError, ParameterError, SimulationError
+from shaftwork.core.errors import CompileError, ShaftworkError
 from shaftwork.hybrid.equation_sets import EquationSets
 from shaftwork.hybrid.event_iteration import EventIteration
 from shaftwork.hybrid.hybrid_model import HybridModel
@@ -73,7 +73,7 @@ class HybridEnsemble(Ensemble):
         impact = self._impacts[key]
         try:
             return [] if impact is None else impact.follow(group, columns)
-        except (CompileError, ParameterError):
+        except CompileError:
             self._impacts[key] = None
             return []
 
@@ -101,7 +101,7 @@ class HybridEnsemble(Ensemble):
         before = HybridState(events.transfer.regime(one.modes), one.x[:, 0], entry.offsets[:, 0].tolist())
         try:
             state, _ = events.run(float(one.t[0]), float(after), before, None if met < 0 else met)
-        except (SimulationError, NetworkError):  # which the run of this variant will tell
+        except ShaftworkError:  # which the run of this variant will tell
             return None
         return one.going_on(state.regime.modes, one.t, state.x[:, None], settled=True)
 
