@@ -105,6 +105,19 @@ def test_a_gap_a_brake_and_a_friction_are_followed_side_by_side() -> None:
     assert compared(NETWORKS["gap, brake and friction"](), 1.2, 1e-7).why == ""
 
 
+def test_digits_do_not_depend_on_the_variants_beside() -> None:
+    """Where impacts are followed for many variants at once, and where one after the other."""
+    net = with_parts(train(SWINGING, shaft=RIGID), sw.HardStop("stop", upper=0.02, restitution=0.5))
+    random = np.random.default_rng(7)
+    samples = {"J1.J": random.uniform(20.0, 30.0, 40), "shaft.gap": random.uniform(0.002, 0.004, 40)}
+    made = sweep(net, samples=samples, t_end=0.3, measures=MEASURES, processes=1)
+    some = {name: values[:17] for name, values in samples.items()}
+    again = sweep(net, samples=some, t_end=0.3, measures=MEASURES, processes=1)
+    assert made.why == again.why == ""
+    for name in MEASURES:
+        np.testing.assert_array_equal(again.measures[name], made.measures[name][:17], err_msg=name)
+
+
 def test_rigid_flanks_throw_back_what_newtons_law_says() -> None:
     """One wheel hits another that rests: momentum is kept, and the speed across comes back with the restitution."""
     random, tau, gap = np.random.default_rng(5), 10.0, 0.1

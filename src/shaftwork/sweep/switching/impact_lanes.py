@@ -89,8 +89,8 @@ class _Hit(NamedTuple):
     """An impact.
 
     Args:
-        before: at the limit.
         closed: with the contact closed.
+        limit: (k,) its twist then, rad.
         back: with it open, and thrown back.
         sure: (k,) where that is beyond doubt.
         thrown: (k,) where it is fast enough to be thrown back.
@@ -99,8 +99,8 @@ class _Hit(NamedTuple):
         loses: (k,) what a rebound takes of the square of the speed.
     """
 
-    before: _Instant
     closed: _Instant
+    limit: Array
     back: _Instant
     sure: Mask
     thrown: Mask
@@ -143,8 +143,8 @@ class LaneImpact:
             new = group.some(there).going_on(modes, flies.t, flies.moved(hit.late[there]).x)
             groups.append(new.some(~last))
         for modes, there in self._ends(hit.closed, stays):
-            rests = hit.closed.taken_to(self.equations_of(modes), there).moved(hit.late[there])
-            rests.x[rests.equations.kirchhoff.twist(self.active.machine)] = self._limit(hit.before)[there]
+            rests = hit.closed.taken_to(self.equations_of(modes), there)
+            rests.x[rests.equations.kirchhoff.twist(self.active.machine)] = hit.limit[there]
             groups.append(group.some(there).going_on(modes, rests.t, rests.x))
         return groups
 
@@ -153,15 +153,16 @@ class LaneImpact:
         leave, number = self.active.leave, self.active.machine
         late, beyond = self._late(found)
         before = found.moved(-late)
-        apart = before.taken_to(self.equations_of(self._apart))
-        closed = apart.taken_to(self.equations_of(with_modes(self._apart, {number: leave.to})))
-        stopped = closed.taken_to(apart.equations)
+        loose = self.equations_of(self._apart)
+        rigid = self.equations_of(with_modes(self._apart, {number: leave.to}))
+        apart, closed = before.taken_to(loose), found.taken_to(loose).taken_to(rigid)
+        stopped = apart.taken_to(rigid).taken_to(loose)
         share, rest = (self._constant(constant, before.p) for constant in (leave.rebound, leave.rest))
-        back = _Instant(apart.equations, found.columns, found.t, apart.x + (1 + share) * (stopped.x - apart.x))
+        back = _Instant(loose, found.columns, found.t, apart.x + (1 + share) * (stopped.x - apart.x))
         closing = self._slope * before.across(number)
         sure = (closing > _least(before)) & (np.abs(stopped.across(number)) <= TYPED * closing)
         loses = (1 - share**2) * closing**2
-        return _Hit(before, closed, back, sure, closing * share > rest, late, beyond, loses)
+        return _Hit(closed, self._limit(found), back, sure, closing * share > rest, late, beyond, loses)
 
     @cached_property
     def _rubbing(self) -> dict[int, GivesWay]:
@@ -185,10 +186,10 @@ class LaneImpact:
         passed = (beyond > 0) & (ahead > 2 * beyond)
         return np.where(passed, beyond * step / np.where(passed, ahead - beyond, 1.0), 0.0), beyond
 
-    def _limit(self, hits: _Instant) -> Array:
+    def _limit(self, found: _Instant) -> Array:
         """(k,) the twist at which the contact closes, in rad."""
-        twist = hits.x[self.equations.kirchhoff.twist(self.active.machine)]
-        return np.asarray(twist - self.active.side * hits.motion[1][self.active.guard] / self._slope)
+        twist = found.x[self.equations.kirchhoff.twist(self.active.machine)]
+        return np.asarray(twist - self.active.side * found.motion[1][self.active.guard] / self._slope)
 
     def _pushed(self, flies: _Instant) -> Array:
         """(k,) how fast the speed changes at which the contact closes."""
