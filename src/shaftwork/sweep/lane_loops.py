@@ -15,7 +15,8 @@ import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array, Index
 from shaftwork.numerics.hermite import JET, peak, powers, reach, root
-from shaftwork.numerics.machine_code import LANES, compiled, inner, run_at
+from shaftwork.numerics.lane_functions import LANES
+from shaftwork.numerics.machine_code import compiled, inner, run_at
 from shaftwork.numerics.tolerances import EPS, ROUNDINGS, TYPED
 from shaftwork.sweep.lane_tables import LaneCourse, LaneRow, LaneTables, Met
 

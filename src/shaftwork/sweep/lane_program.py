@@ -18,7 +18,8 @@ from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import CompileError
 from shaftwork.formulation.explicit_rows import Rows
 from shaftwork.numerics.hermite import JET
-from shaftwork.numerics.machine_code import LANES, LaneBody, compiled, lane_function, run_at
+from shaftwork.numerics.lane_functions import LANES
+from shaftwork.numerics.machine_code import LaneBody, compiled, lane_function, run_at
 from shaftwork.results.measures import EXTREMES, POWERS
 from shaftwork.sweep.lane_loops import follow
 from shaftwork.sweep.lane_step import STAGES, Judged, StepWriter
