@@ -213,12 +213,12 @@ class _VariantCourse:
         on = entry.met == Met.NOTHING
         group, p = group.some(on), p[:, on]
         course = self._course(equations, group, p, entry.some(on), (begin[on], ends[on], highs[on]))
-        program.follow(course, equations.sizes, self.ensemble.rtol, self.ensemble.span)
+        end = program.follow(course, equations.sizes, self.ensemble.rtol, self.ensemble.span)
         for row, place in enumerate(program.integrated):
-            self.values[place, group.lanes] += course.integrals[row]
-        self.values[:, group.lanes] = np.where(self._extreme[:, None], course.best, self.values[:, group.lanes])
-        there, met = VariantGroup(group.modes, group.lanes, course.t, course.x, course.steps), course.met
-        over = (met == Met.THE_END) & (course.t >= self.ensemble.span[1])
+            self.values[place, group.lanes] += end.integrals[row]
+        self.values[:, group.lanes] = np.where(self._extreme[:, None], end.best, self.values[:, group.lanes])
+        there, met = VariantGroup(group.modes, group.lanes, end.t, end.x, end.steps), end.met
+        over = (met == Met.THE_END) & (end.t >= self.ensemble.span[1])
         self._end(equations, there, p, over)
         onward = (met == Met.THE_END) & ~over | (met >= program.guards)  # in the same modes
         met = np.where(met < program.guards, met, Met.NOTHING)
@@ -237,23 +237,9 @@ class _VariantCourse:
         sides, offsets = np.zeros((2, program.guards + program.free, count))
         if len(equations.sides):
             sides[: program.guards], offsets[: program.guards] = equations.sides[:, None], entry.offsets
-        begin, ends, highs = (np.ascontiguousarray(one) for one in pieces)
-        integrals, best = np.zeros((len(program.integrated), count)), self.values[:, group.lanes]
-        met = np.full(count, Met.A_LIMIT)
-        x, p = np.ascontiguousarray(group.x), np.ascontiguousarray(p)
-        return LaneCourse(
-            begin,
-            x.copy(),
-            p,
-            ends,
-            highs,
-            sides,
-            offsets,
-            integrals,
-            np.ascontiguousarray(best),
-            group.steps.copy(),
-            met,
-        )
+        begin, ends, highs = pieces
+        best = self.values[:, group.lanes]
+        return LaneCourse(begin, group.x, p, ends, highs, sides, offsets, best, group.steps)
 
     def _changed(self, before: EnsembleEquations, group: VariantGroup, guard: int) -> list[VariantGroup]:
         """Past a guard: what is stored goes over to the equations that follow, where it goes over unchanged."""

@@ -51,8 +51,9 @@ class StepWriter:
     together.
 
     Args:
-        slopes: address of what writes the slopes at y and the moment.
-        first: the row of the first slopes; those of all stages are behind each other.
+        slopes: address of what writes the slopes at y and the moment, and the row of the first ones; those of all
+            stages are behind each other.
+        sight: address of what writes what is seen there, and its first row.
         count: of slopes.
         states: how many there are; the integrals follow them, as quantities and powers.
         integrals: which of the judged quantities is integrated, and to which power.
@@ -63,8 +64,8 @@ class StepWriter:
 
     def __init__(
         self,
-        slopes: int,
-        first: int,
+        slopes: tuple[int, int],
+        sight: tuple[int, int],
         count: int,
         states: int,
         integrals: Sequence[tuple[Judged, int]],
@@ -72,14 +73,19 @@ class StepWriter:
         signs: Sequence[float],
         guards: int,
     ) -> None:
-        self._slopes, self._first, self._count, self._states = slopes, first, count, states
+        (self._slopes, self._first), self._sight = slopes, sight
+        self._count, self._states = count, states
         self._integrals, self._judged = integrals, judged
         self._signs, self._guards = signs, guards
 
     def probe(self, body: LaneBody) -> None:
-        """Write a step of the given size, without its error."""
+        """Write a step of the given size, without its error, and what is seen at its end."""
         self._begin(body)
         self._stages(body.read("size", 0))
+        with body.loop(0, self._moving) as row:
+            body.put("y", 0, body.read("new", 0, row), row)
+        body.put("moment", 0, body.intrinsic("minnum", body.read("end", 0), body.read("high", 0)))
+        body.run(*self._sight)
 
     def advance(self, body: LaneBody) -> None:
         """Write a step that is made where its error is small enough, and the length of the next one."""
