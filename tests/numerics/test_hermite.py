@@ -7,7 +7,14 @@ import pytest
 from numpy.polynomial import Polynomial
 
 pytest.importorskip("numba")
-from shaftwork.numerics.hermite import BEYOND, peak, powers, reach, root
+from numba import njit
+
+from shaftwork.numerics import hermite
+from shaftwork.numerics.hermite import BEYOND
+
+peak, powers, reach, root = (  # compiled functions alone call those of the library
+    njit(function.py_func) for function in (hermite.peak, hermite.powers, hermite.reach, hermite.root)
+)
 
 COURSE = Polynomial([0.4, -1.3, 2.2, 0.8, -3.1, 1.7])
 LEFT, RIGHT, LENGTH = 0.3, 1.1, 0.8

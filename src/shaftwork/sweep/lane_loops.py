@@ -95,9 +95,9 @@ def _top(tables, probe, stack, row, sign, offset, best, near, enough):  # type: 
     count, when, looks = 1, stack[0, 0], 0
     while count:
         count -= 1
-        low, high, missed, room = stack[count, 0], stack[count, 4], stack[count, 8], stack[count, 9]
-        left = stack[count, 1], stack[count, 2], stack[count, 3]
-        right = stack[count, 5], stack[count, 6], stack[count, 7]
+        interval = stack[count]
+        low, high, missed, room = interval[0], interval[4], interval[8], interval[9]
+        left, right = (interval[1], interval[2], interval[3]), (interval[5], interval[6], interval[7])
         inside, beyond = reach(high - low, left, right)
         if high - low <= TYPED * abs(low) or not inside > max(left[0], right[0]) or inside + beyond <= best + near:
             continue

@@ -20,7 +20,7 @@ from shaftwork.core.errors import CompileError
 from shaftwork.formulation.explicit_rows import Rows
 from shaftwork.numerics.hermite import JET
 from shaftwork.numerics.lane_functions import LANES
-from shaftwork.numerics.machine_code import LaneBody, compiled, lane_function, run_at
+from shaftwork.numerics.machine_code import LaneBody, lane_function
 from shaftwork.results.measures import EXTREMES, POWERS
 from shaftwork.sweep.lane_loops import follow
 from shaftwork.sweep.lane_step import STAGES, Judged, StepWriter
@@ -103,7 +103,7 @@ class LaneProgram:
         rows, states = self._rows(course, sizes, rtol, span), len(sizes)
         now, probe, there = np.zeros((3, self._tables[LaneRow.HEIGHT], LANES))
         now[LaneRow.VARIANT] = -1
-        follow(self._tables, rows, now, probe, there, np.zeros((LANES * JET, 10)), span[1])
+        follow(self._tables, rows, now, probe, there, np.zeros((LANES * JET, 10)), float(span[1]))
         best, x = course.best.copy(), self._array(rows, LaneRow.X)
         for (measure, _), values in zip(self._signs, self._array(rows, LaneRow.BEST), strict=True):
             best[measure] = np.maximum(best[measure], values)
@@ -117,17 +117,15 @@ class LaneProgram:
     def _rows(self, course: LaneCourse, sizes: Array, rtol: float, span: tuple[float, float]) -> Array:
         """What is loaded of each variant, in columns."""
         rows, measures = np.zeros((self._tables[LaneRow.Y], course.t.size)), [measure for measure, _ in self._signs]
+        rows[LaneRow.TOLERANCE] = min(max(OF_A_STEP * rtol, TIGHTEST_TOLERANCE), LOOSEST_TOLERANCE)
+        rows[LaneRow.LONGEST], rows[LaneRow.ACTIVE], rows[LaneRow.MET] = (span[1] - span[0]) / 50, 1.0, Met.A_LIMIT
         values: dict[LaneRow, Any] = {
-            LaneRow.TOLERANCE: min(max(OF_A_STEP * rtol, TIGHTEST_TOLERANCE), LOOSEST_TOLERANCE),
-            LaneRow.LONGEST: (span[1] - span[0]) / 50,
+            LaneRow.VARIANT: range(course.t.size),
             LaneRow.TIME: course.t,
             LaneRow.HIGH: course.highs,
             LaneRow.END: course.ends,
             LaneRow.STEP: course.steps,
-            LaneRow.ACTIVE: 1.0,
             LaneRow.BEGUN: course.t,
-            LaneRow.VARIANT: range(course.t.size),
-            LaneRow.MET: Met.A_LIMIT,
             LaneRow.NOMINAL: sizes[:, None],
             LaneRow.BEST: course.best[measures],
             LaneRow.LOWS: np.inf,
@@ -149,9 +147,15 @@ class LaneProgram:
             x: (n, k) states.
             p: (parameters, k) with what is fixed by them.
         """
-        counts = [len(part) for part in self._parts.values()]
-        values, rows = np.empty((sum(counts), t.size)), np.ascontiguousarray(np.vstack([t, x, p]))
-        _evaluate(self._points.address, rows, np.zeros((len(rows) + len(values), LANES)), values)
+        counts, blocks = [len(part) for part in self._parts.values()], -(-t.size // LANES)
+        count = 1 + len(x) + len(p)
+        rows, memory = np.zeros((count, blocks * LANES)), np.empty((blocks, count + sum(counts), LANES))
+        rows[0, : t.size], rows[1 : 1 + len(x), : t.size], rows[1 + len(x) :, : t.size] = t, x, p
+        memory[:, :count] = rows.reshape(count, blocks, LANES).swapaxes(0, 1)
+        run, start, length = self._points.ctypes, memory.ctypes.data, memory.strides[0]
+        for block in range(blocks):
+            run(start + block * length, count)
+        values = memory[:, count:].swapaxes(0, 1).reshape(sum(counts), blocks * LANES)[:, : t.size]
         return dict(zip(self._parts, np.split(values, np.cumsum(counts)[:-1]), strict=True))
 
 
@@ -243,16 +247,3 @@ class _Derivatives:
             self._named[symbol] = Dummy(real=True)
             self.definitions[self._named[symbol]] = rate
         return self._named[symbol]
-
-
-@compiled()
-def _evaluate(function, rows, memory, values):  # type: ignore[no-untyped-def]
-    """Write the values (values, k) of a function that follow (rows, k) what it reads in its memory."""
-    for start in range(0, rows.shape[1], LANES):
-        for lane in range(LANES):
-            for row in range(rows.shape[0]):
-                memory[row, lane] = rows[row, min(start + lane, rows.shape[1] - 1)]
-        run_at(function, memory, rows.shape[0])
-        for lane in range(min(LANES, rows.shape[1] - start)):
-            for row in range(values.shape[0]):
-                values[row, start + lane] = memory[rows.shape[0] + row, lane]
