@@ -26,17 +26,6 @@ def _fill(memory, row, value):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _look(tables, memory):  # type: ignore[no-untyped-def]
-    """See what there is at the start of a step, and write the first slopes."""
-    for lane in range(LANES):
-        for row in range(tables[LaneNumber.MOVING.value]):
-            memory[tables[LaneRow.Y.value] + row, lane] = memory[tables[LaneRow.X.value] + row, lane]
-        memory[LaneRow.MOMENT.value, lane] = min(memory[LaneRow.TIME.value, lane], memory[LaneRow.HIGH.value, lane])
-    run_at(tables[LaneNumber.JETS.value], memory, tables[LaneRow.SIGHT.value])
-    run_at(tables[LaneNumber.RATES.value], memory, tables[LaneRow.SLOPES.value])
-
-
-@inner
 def _jet(memory, row, sign, offset, lane):  # type: ignore[no-untyped-def]
     """A value and its derivatives of one lane, times a sign and less an offset."""
     return sign * memory[row, lane] - offset, sign * memory[row + 1, lane], sign * memory[row + 2, lane]
@@ -50,7 +39,7 @@ def _repeat(tables, now, probe, lane):  # type: ignore[no-untyped-def]
     for row in range(tables[LaneNumber.MOVING.value]):
         _fill(probe, tables[LaneRow.X.value] + row, now[tables[LaneRow.LAST_X.value] + row, lane])
     _fill(probe, LaneRow.TIME.value, now[LaneRow.LAST_TIME.value, lane])
-    _look(tables, probe)
+    run_at(tables[LaneNumber.LOOK.value], probe, 0)
 
 
 @inner
@@ -268,16 +257,15 @@ def follow(tables, course, now, probe, there, stack, end):  # type: ignore[no-un
     """
     count, waiting, busy = course.shape[1], course.shape[1], True
     while busy:
-        _look(tables, now)
-        run_at(tables[LaneNumber.COMPARE.value], now, 0)
+        run_at(tables[LaneNumber.LOOK.value], now, 0)
         busy, loaded = False, False
         for lane in range(LANES):
             on = now[LaneRow.VARIANT.value, lane] >= 0
             to_see = now[LaneRow.CLOSE.value, lane] > 0 or now[LaneRow.TIME.value, lane] >= now[LaneRow.END.value, lane]
             if now[LaneRow.MOVED.value, lane] > 0 and to_see:
                 on = not _arrived(tables, course, now, probe, there, stack, lane) and on
-            elif on and _hopeless(now, lane, end):
-                on = False
+            on = on and not _hopeless(now, lane, end)
+            now[LaneRow.MOVED.value, lane] = 0.0
             if not on and waiting:
                 for row in range(tables[LaneRow.Y.value]):
                     now[row, lane] = course[row, count - waiting]
@@ -286,8 +274,8 @@ def follow(tables, course, now, probe, there, stack, end):  # type: ignore[no-un
                 now[LaneRow.ACTIVE.value, lane], now[LaneRow.VARIANT.value, lane] = 0.0, -1.0
             busy = busy or on
         if loaded:
-            _look(tables, now)
-            for lane in range(LANES):
-                if now[LaneRow.MADE.value, lane] == 0 and now[LaneRow.ACTIVE.value, lane] > 0:
-                    _begin(tables, now, lane)
+            continue  # nothing is seen yet of what is new
+        for lane in range(LANES):
+            if now[LaneRow.MADE.value, lane] == 0 and now[LaneRow.ACTIVE.value, lane] > 0:
+                _begin(tables, now, lane)
         run_at(tables[LaneNumber.ADVANCE.value], now, 0)

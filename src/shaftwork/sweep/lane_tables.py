@@ -97,25 +97,21 @@ class LaneRow(IntEnum):
 class LaneNumber(IntEnum):
     """What is told about lanes, behind the first rows of what is in their memory."""
 
-    RATES = LaneRow.HEIGHT + 1
-    """Address of what writes the slopes at y and the moment."""
-    JETS = LaneRow.HEIGHT + 2
-    """Of what writes what is seen there."""
-    PROBE = LaneRow.HEIGHT + 3
-    """Of what makes a step of a given size, and writes what is seen behind it."""
-    ADVANCE = LaneRow.HEIGHT + 4
+    PROBE = LaneRow.HEIGHT + 1
+    """Address of what makes a step of a given size, and writes what is seen behind it."""
+    ADVANCE = LaneRow.HEIGHT + 2
     """Of what makes a step that is as long as the tolerance lets it be."""
-    COMPARE = LaneRow.HEIGHT + 5
-    """Of what looks at the ends of the last step."""
-    STATES = LaneRow.HEIGHT + 6
+    LOOK = LaneRow.HEIGHT + 3
+    """Of what writes the first slopes and what is seen at the start of a step, and looks at the last one."""
+    STATES = LaneRow.HEIGHT + 4
     """How many; integrals follow them,"""
-    MOVING = LaneRow.HEIGHT + 7
+    MOVING = LaneRow.HEIGHT + 5
     """and so many are both."""
-    EXTREMES = LaneRow.HEIGHT + 8
+    EXTREMES = LaneRow.HEIGHT + 6
     """How many; what they are of is seen first."""
-    GUARDS = LaneRow.HEIGHT + 9
+    GUARDS = LaneRow.HEIGHT + 7
     """How many of those seen behind them are guards and switches."""
-    FREE = LaneRow.HEIGHT + 10
+    FREE = LaneRow.HEIGHT + 8
     """How many of these are switches of laws; they come last."""
 
 
