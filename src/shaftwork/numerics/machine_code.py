@@ -6,6 +6,7 @@ import ctypes
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -14,12 +15,12 @@ from numba import cfunc, njit, types
 from numba.core import cgutils
 from numba.extending import get_cython_function_address, intrinsic
 
+from shaftwork.numerics.lane_functions import LANE_FUNCTIONS, LANES, NUMBERS, Numbers
+
 VECTOR, MATRIX = types.Array(types.float64, 1, "C"), types.Array(types.float64, 2, "C")
 CONSTANT = types.Array(types.float64, 1, "C", readonly=True)
 SYSTEM = (types.float64, VECTOR, VECTOR, VECTOR)
 """What a system takes: t in s, x (n,), p (parameters,) and an array that it writes."""
-LANES = 8
-"""Systems side by side in one call: as many numbers as a processor adds at once, or a few times as many."""
 
 _quantile = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double, ctypes.c_int)(
     get_cython_function_address("scipy.special.cython_special", "ndtri")
@@ -114,16 +115,14 @@ class LaneBody(Body):
         rows: the first row of each array.
     """
 
-    _kind = ir.VectorType(ir.DoubleType(), LANES)
-
     def __init__(self, context: Any, builder: Any, arguments: Sequence[Any], rows: Mapping[str, int]) -> None:
         self._context, self.builder, self._rows = context, builder, rows
-        self._memory = builder.inttoptr(arguments[0], self._kind.as_pointer())
+        self._memory = builder.inttoptr(arguments[0], NUMBERS.as_pointer())
         self._written = builder.gep(self._memory, [arguments[1]])
         self.t = self.read("moment", 0)
 
     def number(self, value: float) -> Any:
-        return ir.Constant(self._kind, [value] * LANES)
+        return ir.Constant(NUMBERS, [value] * LANES)
 
     def bit(self, *, value: bool) -> Any:
         return ir.Constant(ir.VectorType(ir.IntType(1), LANES), [value] * LANES)
@@ -143,14 +142,38 @@ class LaneBody(Body):
         self.builder.store(value, self._at(self._memory, self._rows[array] + place, row), align=8)
 
     def intrinsic(self, name: str, *values: Any) -> Any:
-        title, kind = f"llvm.{name}.v{LANES}f64", ir.FunctionType(self._kind, [self._kind] * len(values))
-        return self.builder.call(self.builder.module.declare_intrinsic(title, (), kind), values)
+        first, *others = (Numbers(self.builder, value) for value in values)
+        return first.intrinsic(name, *others).value
 
     def call(self, function: Any, *values: Any) -> Any:
+        if function in LANE_FUNCTIONS:
+            return self.builder.call(self._function(function), values)
+        return self.call_one_by_one(function, *values)
+
+    def _function(self, function: Any) -> Any:
+        """A function of all lanes, once in what is compiled; beyond its range a lane takes that of one number."""
+        name, module = f"lanes.{function.__name__}", self.builder.module
+        if name not in module.globals:
+            code = ir.Function(module, ir.FunctionType(NUMBERS, [NUMBERS]), name)
+            code.linkage = "internal"
+            code.attributes.add("noinline")
+            inside = copy(self)
+            inside.builder = build = ir.IRBuilder(code.append_basic_block())
+            x, (write, low, high) = Numbers(build, code.args[0]), LANE_FUNCTIONS[function]
+            result, good = write(x), x.between(low, high)
+            bits = ir.IntType(LANES)
+            with build.if_then(build.icmp_unsigned("!=", build.bitcast(good, bits), bits(-1)), likely=False):
+                alone = Numbers(build, inside.call_one_by_one(function, x.value))
+                build.ret(result.where(good, alone).value)
+            build.ret(result.value)
+        return module.globals[name]
+
+    def call_one_by_one(self, function: Any, *values: Any) -> Any:
+        """A function of one lane after the other."""
         result = self.number(0.0)
         for lane in range(LANES):
             number = ir.Constant(ir.IntType(32), lane)
-            one = [self.builder.extract_element(v, number) if v.type == self._kind else v for v in values]
+            one = [self.builder.extract_element(v, number) if v.type == NUMBERS else v for v in values]
             result = self.builder.insert_element(result, super().call(function, *one), number)
         return result
 

@@ -233,19 +233,19 @@ class _VariantCourse:
         on = entry.met == Met.NOTHING
         group, p = group.some(on), p[:, on]
         course = self._course(equations, group, p, entry.some(on), (begin[on], ends[on], highs[on]))
-        program.follow(course, equations.sizes, self.ensemble.rtol, self.ensemble.span)
+        end = program.follow(course, equations.sizes, self.ensemble.rtol, self.ensemble.span)
         for row, place in enumerate(program.integrated):
-            self.values[place, group.lanes] += course.integrals[row]
-        self.values[:, group.lanes] = np.where(self._extreme[:, None], course.best, self.values[:, group.lanes])
-        there, met = replace(group.going_on(group.modes, course.t, course.x), steps=course.steps), course.met
-        over = (met == Met.THE_END) & (course.t >= self.ensemble.span[1])
+            self.values[place, group.lanes] += end.integrals[row]
+        self.values[:, group.lanes] = np.where(self._extreme[:, None], end.best, self.values[:, group.lanes])
+        there, met = replace(group.going_on(group.modes, end.t, end.x), steps=end.steps), end.met
+        over = (met == Met.THE_END) & (end.t >= self.ensemble.span[1])
         self._end(equations, there, p, over)
         self._switched[group.lanes[met >= program.guards]] += 1
         switched = (met >= program.guards) & (self._switched[group.lanes] < 200)  # more of them come to no end
         onward = (met == Met.THE_END) & ~over | switched  # in the same modes
         ended = (met >= 0) & (met < program.guards)
         left = PhaseEntry(np.where(ended, met, Met.NOTHING), entry.offsets[:, on])
-        return [*following, there.some(onward), *self._past_guards(equations, there, course.t, left)]
+        return [*following, there.some(onward), *self._past_guards(equations, there, end.t, left)]
 
     def _past_guards(
         self, equations: EnsembleEquations, group: VariantGroup, after: Array, entry: PhaseEntry
@@ -271,23 +271,9 @@ class _VariantCourse:
         sides, offsets = np.zeros((2, program.guards + program.free, count))
         if len(equations.sides):
             sides[: program.guards], offsets[: program.guards] = equations.sides[:, None], entry.offsets
-        begin, ends, highs = (np.ascontiguousarray(one) for one in pieces)
-        integrals, best = np.zeros((len(program.integrated), count)), self.values[:, group.lanes]
-        met = np.full(count, Met.A_LIMIT)
-        x, p = np.ascontiguousarray(group.x), np.ascontiguousarray(p)
-        return LaneCourse(
-            begin,
-            x.copy(),
-            p,
-            ends,
-            highs,
-            sides,
-            offsets,
-            integrals,
-            np.ascontiguousarray(best),
-            group.steps.copy(),
-            met,
-        )
+        begin, ends, highs = pieces
+        best = self.values[:, group.lanes]
+        return LaneCourse(begin, group.x, p, ends, highs, sides, offsets, best, group.steps)
 
     def _past(self, equations: EnsembleEquations, group: VariantGroup, guard: int) -> list[VariantGroup]:
         """Past a guard, the lanes in which what follows is beyond doubt."""

@@ -9,31 +9,13 @@ reach a limit, or more than the largest value so far, the step is made again up 
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from shaftwork.codegen.array_form.elements import Array, Index
 from shaftwork.numerics.hermite import JET, peak, powers, reach, root
-from shaftwork.numerics.machine_code import LANES, compiled, inner, run_at
+from shaftwork.numerics.lane_functions import LANES
+from shaftwork.numerics.machine_code import compiled, inner, run_at
 from shaftwork.numerics.tolerances import EPS, ROUNDINGS, TYPED
-from shaftwork.sweep.lane_tables import LaneCourse, LaneRow, LaneTables, Met
-
-
-class _Lanes(NamedTuple):
-    """Eight lanes.
-
-    Args:
-        now: (rows, LANES) memory.
-        probe: (rows, LANES) memory in which one lane is followed.
-        stack: intervals in which a peak is looked for.
-        variants: (LANES,) which each lane is; -1 for none.
-    """
-
-    now: Array
-    probe: Array
-    stack: Array
-    variants: Index
+from shaftwork.sweep.lane_tables import LaneNumber, LaneRow, Met
 
 
 @inner
@@ -44,44 +26,28 @@ def _fill(memory, row, value):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _look(tables, memory):  # type: ignore[no-untyped-def]
-    """See what there is at the start of a step, and write the first slopes."""
-    for lane in range(LANES):
-        for row in range(tables.moving):
-            memory[tables.first[LaneRow.Y.value] + row, lane] = memory[tables.first[LaneRow.X.value] + row, lane]
-        memory[LaneRow.MOMENT.value, lane] = min(memory[LaneRow.TIME.value, lane], memory[LaneRow.HIGH.value, lane])
-    run_at(tables.jets, memory, tables.first[LaneRow.SIGHT.value])
-    run_at(tables.rates, memory, tables.first[LaneRow.SLOPES.value])
-
-
-@inner
 def _jet(memory, row, sign, offset, lane):  # type: ignore[no-untyped-def]
     """A value and its derivatives of one lane, times a sign and less an offset."""
     return sign * memory[row, lane] - offset, sign * memory[row + 1, lane], sign * memory[row + 2, lane]
 
 
 @inner
-def _repeat(tables, lanes, lane):  # type: ignore[no-untyped-def]
+def _repeat(tables, now, probe, lane):  # type: ignore[no-untyped-def]
     """Let all lanes of the probe start where the last step of one did."""
-    probe, now, first = lanes.probe, lanes.now, tables.first
-    for row in range(first[LaneRow.HEIGHT.value]):
+    for row in range(tables[LaneRow.Y.value]):
         _fill(probe, row, now[row, lane])
-    for row in range(tables.moving):
-        _fill(probe, first[LaneRow.X.value] + row, now[first[LaneRow.LAST_X.value] + row, lane])
+    for row in range(tables[LaneNumber.MOVING.value]):
+        _fill(probe, tables[LaneRow.X.value] + row, now[tables[LaneRow.LAST_X.value] + row, lane])
     _fill(probe, LaneRow.TIME.value, now[LaneRow.LAST_TIME.value, lane])
-    _look(tables, probe)
+    run_at(tables[LaneNumber.LOOK.value], probe, 0)
 
 
 @inner
 def _probe(tables, probe, t):  # type: ignore[no-untyped-def]
     """Follow the lane in a probe up to a time in s, and see what is there."""
-    first = tables.first
     _fill(probe, LaneRow.SIZE.value, t - probe[LaneRow.TIME.value, 0])
-    run_at(tables.probe, probe, 0)
-    for row in range(tables.moving):
-        _fill(probe, first[LaneRow.Y.value] + row, probe[first[LaneRow.NEW.value] + row, 0])
-    _fill(probe, LaneRow.MOMENT.value, min(t, probe[LaneRow.HIGH.value, 0]))
-    run_at(tables.jets, probe, first[LaneRow.SIGHT.value])
+    _fill(probe, LaneRow.END.value, t)
+    run_at(tables[LaneNumber.PROBE.value], probe, 0)
 
 
 @inner
@@ -102,26 +68,25 @@ def _rise(tables, probe, row, sign, offset, low, high, there):  # type: ignore[n
 
 
 @inner
-def _put(stack, row, low, left, high, right, missed, room):  # type: ignore[no-untyped-def]
+def _put(interval, low, left, high, right, missed, room):  # type: ignore[no-untyped-def]
     """An interval: time and jet at both ends, how much the quintic was off at one of them, and how near that was."""
-    interval = stack[row]
     interval[0], interval[1], interval[2], interval[3] = low, left[0], left[1], left[2]
     interval[4], interval[5], interval[6], interval[7] = high, right[0], right[1], right[2]
     interval[8], interval[9] = missed, room
 
 
 @inner
-def _top(tables, lanes, row, sign, offset, best, near, enough):  # type: ignore[no-untyped-def]
+def _top(tables, probe, stack, row, sign, offset, best, near, enough):  # type: ignore[no-untyped-def]
     """The largest value in the interval that is on the stack, and when; or the first that is seen above `enough`.
 
     NaN where no peak can be told.
     """
-    stack, probe, count, when, looks = lanes.stack, lanes.probe, 1, lanes.stack[0, 0], 0
+    count, when, looks = 1, stack[0, 0], 0
     while count:
         count -= 1
-        low, high, missed, room = stack[count, 0], stack[count, 4], stack[count, 8], stack[count, 9]
-        left = stack[count, 1], stack[count, 2], stack[count, 3]
-        right = stack[count, 5], stack[count, 6], stack[count, 7]
+        interval = stack[count]
+        low, high, missed, room = interval[0], interval[4], interval[8], interval[9]
+        left, right = (interval[1], interval[2], interval[3]), (interval[5], interval[6], interval[7])
         inside, beyond = reach(high - low, left, right)
         if high - low <= TYPED * abs(low) or not inside > max(left[0], right[0]) or inside + beyond <= best + near:
             continue
@@ -131,7 +96,7 @@ def _top(tables, lanes, row, sign, offset, best, near, enough):  # type: ignore[
         t = low + place * (high - low)
         # what a polynomial misses grows with the cube of the distance from a point that it goes through
         part = min(t - low, high - t) / room if room > 0 else 1.0
-        if part < 0.01 and missed * part**3 < near:
+        if part < 0.01 and missed * part * part * part < near:
             best = max(best, height) if enough == np.inf else best
             continue
         if looks > 60 or count + 2 > len(stack):
@@ -144,39 +109,37 @@ def _top(tables, lanes, row, sign, offset, best, near, enough):  # type: ignore[
             if best > enough:
                 return best, when
         missed, room = abs(height - middle[0]), min(t - low, high - t)
-        _put(stack, count, low, left, t, middle, missed, room)
-        _put(stack, count + 1, t, middle, high, right, missed, room)
+        _put(stack[count], low, left, t, middle, missed, room)
+        _put(stack[count + 1], t, middle, high, right, missed, room)
         count += 2
     return best, when
 
 
 @inner
-def _first_met(tables, lanes, lane):  # type: ignore[no-untyped-def]
+def _first_met(tables, now, probe, stack, lane):  # type: ignore[no-untyped-def]
     """The guard that is met first in the last step of a lane, and when in s; Met.NOTHING where none is."""
-    now, met, extremes = lanes.now, Met.NOTHING.value, tables.extremes.shape[0]
     low, high = now[LaneRow.LAST_TIME.value, lane], now[LaneRow.TIME.value, lane]
-    end = high
-    for guard in range(tables.guards):
-        side, offset, number = (
-            now[tables.first[LaneRow.SIDES.value] + guard, lane],
-            now[tables.first[LaneRow.OFFSETS.value] + guard, lane],
-            extremes + guard,
-        )
-        left = _jet(now, tables.first[LaneRow.LAST_SIGHT.value] + JET * number, side, offset, lane)
-        right = _jet(now, tables.first[LaneRow.SIGHT.value] + JET * number, side, offset, lane)
+    met, end = Met.NOTHING.value, high
+    for guard in range(tables[LaneNumber.GUARDS.value]):
+        side = now[tables[LaneRow.SIDES.value] + guard, lane]
+        offset = now[tables[LaneRow.OFFSETS.value] + guard, lane]
+        number = JET * (tables[LaneNumber.EXTREMES.value] + guard)
+        row = tables[LaneRow.SIGHT.value] + number
+        left = _jet(now, tables[LaneRow.LAST_SIGHT.value] + number, side, offset, lane)
+        right = _jet(now, row, side, offset, lane)
         inside, beyond = reach(high - low, left, right)
         if side == 0.0 or (right[0] <= 0 and inside + beyond <= 0):
             continue
-        upper, value, row = high, right[0], tables.first[LaneRow.SIGHT.value] + JET * number
+        upper, value = high, right[0]
         if value <= 0:
-            _put(lanes.stack, 0, low, left, high, right, 0.0, 0.0)
+            _put(stack[0], low, left, high, right, 0.0, 0.0)
             near = TYPED * max(abs(left[0]), abs(right[0]))
-            value, upper = _top(tables, lanes, row, side, offset, 0.0, near, 0.0)
+            value, upper = _top(tables, probe, stack, row, side, offset, 0.0, near, 0.0)
         if not value > 0:
             continue
         share = (upper - low) / (high - low)
-        guess = low + (high - low) * root(powers(high - low, left, right), 0.0, share, 1.0, 8)
-        time = _rise(tables, lanes.probe, row, side, offset, low, upper, guess)
+        guess = low + (high - low) * root(powers(high - low, left, right), 0.0, share, 1.0)
+        time = _rise(tables, probe, row, side, offset, low, upper, guess)
         if time < end or met == Met.NOTHING.value:
             met, end = guard, time
     return met, end
@@ -186,111 +149,85 @@ def _first_met(tables, lanes, lane):  # type: ignore[no-untyped-def]
 def _past(tables, probe, end):  # type: ignore[no-untyped-def]
     """A time in s just past that of a probe, up to which no state moves by more than a hundredth of its tolerance."""
     longest, tolerance = np.inf, probe[LaneRow.TOLERANCE.value, 0]
-    for row in range(tables.states):
-        x = probe[tables.first[LaneRow.NEW.value] + row, 0]
-        rate = (x - probe[tables.first[LaneRow.X.value] + row, 0]) / probe[LaneRow.SIZE.value, 0]
+    for row in range(tables[LaneNumber.STATES.value]):
+        x = probe[tables[LaneRow.NEW.value] + row, 0]
+        rate = (x - probe[tables[LaneRow.X.value] + row, 0]) / probe[LaneRow.SIZE.value, 0]
         if rate != 0.0:
-            longest = min(
-                longest, 0.01 * tolerance * (probe[tables.first[LaneRow.NOMINAL.value] + row, 0] + abs(x)) / abs(rate)
-            )
+            allowed = 0.01 * tolerance * (probe[tables[LaneRow.NOMINAL.value] + row, 0] + abs(x))
+            longest = min(longest, allowed / abs(rate))
     return min(end, probe[LaneRow.MOMENT.value, 0] + longest)
 
 
 @inner
-def _measure(tables, lanes, seen, lane, end):  # type: ignore[no-untyped-def]
+def _measure(tables, now, probe, stack, seen, lane, end):  # type: ignore[no-untyped-def]
     """Take the inside of the last step of a lane into the extremes, up to a time in s and what is seen there."""
-    now = lanes.now
     low = now[LaneRow.LAST_TIME.value, lane]
-    for k in range(tables.extremes.shape[0]):
-        number, sign = JET * tables.extremes[k, 0], tables.signs[k]
-        left = _jet(now, tables.first[LaneRow.LAST_SIGHT.value] + number, sign, 0.0, lane)
-        right = _jet(seen, tables.first[LaneRow.SIGHT.value] + number, sign, 0.0, lane)
-        best = max(now[tables.first[LaneRow.BEST.value] + k, lane], left[0], right[0])
-        lowest = min(now[tables.first[LaneRow.LOWS.value] + k, lane], left[0], right[0])
-        _put(lanes.stack, 0, low, left, end, right, 0.0, 0.0)
-        best, _ = _top(
-            tables, lanes, tables.first[LaneRow.SIGHT.value] + number, sign, 0.0, best, TYPED * (best - lowest), np.inf
-        )
-        now[tables.first[LaneRow.BEST.value] + k, lane], now[tables.first[LaneRow.LOWS.value] + k, lane] = best, lowest
+    for k in range(tables[LaneNumber.EXTREMES.value]):
+        sign, row = now[tables[LaneRow.SIGNS.value] + k, lane], tables[LaneRow.SIGHT.value] + JET * k
+        left = _jet(now, tables[LaneRow.LAST_SIGHT.value] + JET * k, sign, 0.0, lane)
+        right = _jet(seen, row, sign, 0.0, lane)
+        best = max(now[tables[LaneRow.BEST.value] + k, lane], left[0], right[0])
+        lowest = min(now[tables[LaneRow.LOWS.value] + k, lane], left[0], right[0])
+        _put(stack[0], low, left, end, right, 0.0, 0.0)
+        best, _ = _top(tables, probe, stack, row, sign, 0.0, best, TYPED * (best - lowest), np.inf)
+        now[tables[LaneRow.BEST.value] + k, lane], now[tables[LaneRow.LOWS.value] + k, lane] = best, lowest
 
 
 @inner
-def _load(tables, course, lanes, lane, variant):  # type: ignore[no-untyped-def]
-    """Let a variant begin in a lane."""
-    now = lanes.now
-    now[LaneRow.TIME.value, lane], now[LaneRow.BEGUN.value, lane] = course.t[variant], course.t[variant]
-    now[LaneRow.HIGH.value, lane], now[LaneRow.END.value, lane] = course.highs[variant], course.ends[variant]
-    now[LaneRow.ACTIVE.value, lane], now[LaneRow.STEP.value, lane], now[LaneRow.MADE.value, lane] = 1.0, -1.0, 0.0
-    for row in range(tables.moving):
-        now[tables.first[LaneRow.X.value] + row, lane] = course.x[row, variant] if row < tables.states else 0.0
-    for row in range(course.p.shape[0]):
-        now[tables.first[LaneRow.P.value] + row, lane] = course.p[row, variant]
-    for guard in range(tables.guards):
-        now[tables.first[LaneRow.SIDES.value] + guard, lane] = course.sides[guard, variant]
-        now[tables.first[LaneRow.OFFSETS.value] + guard, lane] = course.offsets[guard, variant]
-    for k in range(tables.extremes.shape[0]):
-        now[tables.first[LaneRow.BEST.value] + k, lane] = course.best[tables.extremes[k, 1], variant]
-        now[tables.first[LaneRow.LOWS.value] + k, lane] = np.inf
-
-
-@inner
-def _leave(tables, course, lanes, memory, x, lane, t, met):  # type: ignore[no-untyped-def]
+def _leave(tables, course, now, memory, x, lane, t, met):  # type: ignore[no-untyped-def]
     """Write where a variant has come to in a lane, from the row where its states stand, and what it has met."""
-    variant = lanes.variants[lane]
-    course.met[variant], course.t[variant], course.steps[variant] = met, t, lanes.now[LaneRow.SIZE.value, lane]
-    for row in range(tables.moving):
-        if row < tables.states:
-            course.x[row, variant] = memory[x + row, lane]
-        else:
-            course.integrals[row - tables.states, variant] += memory[x + row, lane]
-    for k in range(tables.extremes.shape[0]):
-        row, best = tables.extremes[k, 1], lanes.now[tables.first[LaneRow.BEST.value] + k, lane]
-        course.best[row, variant] = best if np.isnan(best) else max(course.best[row, variant], best)
+    variant = np.int64(now[LaneRow.VARIANT.value, lane])
+    course[LaneRow.MET.value, variant], course[LaneRow.TIME.value, variant] = met, t
+    course[LaneRow.STEP.value, variant] = now[LaneRow.SIZE.value, lane]
+    for row in range(tables[LaneNumber.MOVING.value]):
+        course[tables[LaneRow.X.value] + row, variant] = memory[x + row, lane]
+    for row in range(tables[LaneRow.BEST.value], tables[LaneRow.LOWS.value]):
+        course[row, variant] = now[row, lane]
 
 
 @inner
-def _begin(tables, lanes, lane, last):  # type: ignore[no-untyped-def]
-    """Set the first step: as the last one, in s, or such that no state changes by more than a hundredth of its size.
+def _begin(tables, now, lane):  # type: ignore[no-untyped-def]
+    """Set the first step: as the last one, or such that no state changes by more than a hundredth of its size.
 
     A law's switch is met on the side on which its value is not, or to which it does not go.
     """
-    now, step = lanes.now, np.inf
-    for row in range(tables.states):
-        x, rate = now[tables.first[LaneRow.X.value] + row, lane], now[tables.first[LaneRow.SLOPES.value] + row, lane]
+    step = np.inf
+    for row in range(tables[LaneNumber.STATES.value]):
+        x, rate = now[tables[LaneRow.X.value] + row, lane], now[tables[LaneRow.SLOPES.value] + row, lane]
         if rate != 0.0:
-            step = min(step, 0.01 * (now[tables.first[LaneRow.NOMINAL.value] + row, lane] + abs(x)) / abs(rate))
-    now[LaneRow.STEP.value, lane] = max(step, last)
-    for guard in range(tables.guards - tables.free, tables.guards):
-        now[tables.first[LaneRow.SIDES.value] + guard, lane] = 0.0
-        row = tables.first[LaneRow.SIGHT.value] + JET * (tables.extremes.shape[0] + guard)
-        for value in _jet(now, row, 1.0, 0.0, lane):
-            if value != 0.0:
-                now[tables.first[LaneRow.SIDES.value] + guard, lane] = -np.sign(value)
-                break
+            step = min(step, 0.01 * (now[tables[LaneRow.NOMINAL.value] + row, lane] + abs(x)) / abs(rate))
+    now[LaneRow.STEP.value, lane] = max(step, now[LaneRow.STEP.value, lane])
+    guards = tables[LaneNumber.GUARDS.value]
+    for guard in range(guards - tables[LaneNumber.FREE.value], guards):
+        side, row = 0.0, tables[LaneRow.SIGHT.value] + JET * (tables[LaneNumber.EXTREMES.value] + guard)
+        for k in range(JET - 1, -1, -1):
+            if now[row + k, lane] != 0.0:
+                side = -np.sign(now[row + k, lane])
+        now[tables[LaneRow.SIDES.value] + guard, lane] = side
 
 
 @inner
-def _arrived(tables, course, lanes, lane):  # type: ignore[no-untyped-def]
+def _arrived(tables, course, now, probe, there, stack, lane):  # type: ignore[no-untyped-def]
     """Whether a lane is done: it has met a guard in its last step, or is at its end."""
-    now, met = lanes.now, Met.NOTHING.value
-    end, last, close = now[LaneRow.TIME.value, lane], now[LaneRow.END.value, lane], now[LaneRow.CLOSE.value, lane] > 0
-    if close:
-        _repeat(tables, lanes, lane)
-        met, end = _first_met(tables, lanes, lane)
-    if met == Met.NOTHING.value:
-        if close:
-            _measure(tables, lanes, now, lane, end)
-        if end >= last:
-            _leave(tables, course, lanes, now, tables.first[LaneRow.X.value], lane, end, Met.THE_END.value)
-        return end >= last
-    _probe(tables, lanes.probe, end)
-    if met >= tables.guards - tables.free:
-        end = _past(tables, lanes.probe, last)
-        _probe(tables, lanes.probe, end)
-    there = lanes.probe.copy()
-    _measure(tables, lanes, there, lane, end)
-    _leave(tables, course, lanes, there, tables.first[LaneRow.NEW.value], lane, end, met)
-    return True
+    met, end, last = Met.NOTHING.value, now[LaneRow.TIME.value, lane], now[LaneRow.END.value, lane]
+    seen, x, guards = now, tables[LaneRow.X.value], tables[LaneNumber.GUARDS.value]
+    if now[LaneRow.CLOSE.value, lane] > 0:
+        _repeat(tables, now, probe, lane)
+        met, end = _first_met(tables, now, probe, stack, lane)
+        if met != Met.NOTHING.value:
+            _probe(tables, probe, end)
+            if met >= guards - tables[LaneNumber.FREE.value]:
+                end = _past(tables, probe, last)
+                _probe(tables, probe, end)
+            for row in range(tables[LaneRow.HEIGHT.value]):
+                there[row, lane] = probe[row, lane]
+            seen, x = there, tables[LaneRow.NEW.value]
+        _measure(tables, now, probe, stack, seen, lane, end)
+    if met == Met.NOTHING.value and end >= last:
+        met = Met.THE_END.value
+    if met != Met.NOTHING.value:
+        _leave(tables, course, now, seen, x, lane, end, met)
+    return met != Met.NOTHING.value
 
 
 @inner
@@ -306,55 +243,39 @@ def _hopeless(now, lane, end):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def follow(  # type: ignore[no-untyped-def]
-    rates, jets, probe, advance, compare, first, states, moving, guards, free, extremes, signs,
-    t, x, p, ends, highs, sides, offsets, integrals, best, steps, met, nominal, limits,
-):  # fmt: skip
+def follow(tables, course, now, probe, there, stack, end):  # type: ignore[no-untyped-def]
     """Follow all variants of a course up to a guard, their end or a limit.
 
-    All are plain arrays and numbers: numba keeps what it compiles by their kinds, from one version to the next.
-
     Args:
-        rates, jets, probe, advance, compare, first, states, moving, guards, free, extremes, signs: `LaneTables`.
-        t, x, p, ends, highs, sides, offsets, integrals, best, steps, met: `LaneCourse`.
-        nominal: (n,) sizes of the states.
-        limits: (3,) the tolerance of a step, the longest step and the end of the motion, s.
+        tables: first rows of all that `LaneRow` names, and behind them what `LaneNumber` does.
+        course: (first row of Y, k) variants; changed in place.
+        now: (rows, LANES) memory; no variant is in it.
+        probe: another one, in which one lane is followed.
+        there: another one, for the end of a step.
+        stack: (intervals, 10) in which a peak is looked for.
+        end: of the motion, s.
     """
-    tables = LaneTables(rates, jets, probe, advance, compare, first, states, moving, guards, free, extremes, signs)
-    course = LaneCourse(t, x, p, ends, highs, sides, offsets, integrals, best, steps, met)
-    lanes = _Lanes(
-        np.zeros((tables.first[LaneRow.HEIGHT.value], LANES)),
-        np.zeros((tables.first[LaneRow.HEIGHT.value], LANES)),
-        np.zeros((LANES * JET, 10)),
-        np.full(LANES, -1),
-    )
-    now, variants, waiting, busy = lanes.now, lanes.variants, course.t.size, True
-    _fill(now, LaneRow.TOLERANCE.value, limits[0])
-    _fill(now, LaneRow.LONGEST.value, limits[1])
-    for row in range(tables.states):
-        _fill(now, tables.first[LaneRow.NOMINAL.value] + row, nominal[row])
+    count, waiting, busy = course.shape[1], course.shape[1], True
     while busy:
-        _look(tables, now)
-        run_at(tables.compare, now, 0)
+        run_at(tables[LaneNumber.LOOK.value], now, 0)
         busy, loaded = False, False
         for lane in range(LANES):
-            variant = variants[lane]
+            on = now[LaneRow.VARIANT.value, lane] >= 0
             to_see = now[LaneRow.CLOSE.value, lane] > 0 or now[LaneRow.TIME.value, lane] >= now[LaneRow.END.value, lane]
             if now[LaneRow.MOVED.value, lane] > 0 and to_see:
-                if _arrived(tables, course, lanes, lane):
-                    variant = -1
-            elif variant >= 0 and _hopeless(now, lane, limits[2]):
-                variant = -1
-            if variant < 0 and waiting:
-                variant, waiting, loaded = course.t.size - waiting, waiting - 1, True
-                _load(tables, course, lanes, lane, variant)
-            elif variant < 0:
-                now[LaneRow.ACTIVE.value, lane] = 0.0
-            variants[lane] = variant
-            busy = busy or variant >= 0
+                on = not _arrived(tables, course, now, probe, there, stack, lane) and on
+            on = on and not _hopeless(now, lane, end)
+            now[LaneRow.MOVED.value, lane] = 0.0
+            if not on and waiting:
+                for row in range(tables[LaneRow.Y.value]):
+                    now[row, lane] = course[row, count - waiting]
+                waiting, loaded, on = waiting - 1, True, True
+            elif not on:
+                now[LaneRow.ACTIVE.value, lane], now[LaneRow.VARIANT.value, lane] = 0.0, -1.0
+            busy = busy or on
         if loaded:
-            _look(tables, now)
-            for lane in range(LANES):
-                if now[LaneRow.STEP.value, lane] < 0:
-                    _begin(tables, lanes, lane, course.steps[variants[lane]])
-        run_at(tables.advance, now, 0)
+            continue  # nothing is seen yet of what is new
+        for lane in range(LANES):
+            if now[LaneRow.MADE.value, lane] == 0 and now[LaneRow.ACTIVE.value, lane] > 0:
+                _begin(tables, now, lane)
+        run_at(tables[LaneNumber.ADVANCE.value], now, 0)

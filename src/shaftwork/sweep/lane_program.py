@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numba.core.errors import NumbaError
@@ -18,11 +19,12 @@ from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import CompileError
 from shaftwork.formulation.explicit_rows import Rows
 from shaftwork.numerics.hermite import JET
-from shaftwork.numerics.machine_code import LANES, LaneBody, compiled, lane_function, run_at
+from shaftwork.numerics.lane_functions import LANES
+from shaftwork.numerics.machine_code import LaneBody, lane_function
 from shaftwork.results.measures import EXTREMES, POWERS
 from shaftwork.sweep.lane_loops import follow
 from shaftwork.sweep.lane_step import STAGES, Judged, StepWriter
-from shaftwork.sweep.lane_tables import LaneCourse, LaneRow, LaneTables
+from shaftwork.sweep.lane_tables import LaneCourse, LaneEnd, LaneRow, Met
 
 OF_A_STEP, LOOSEST_TOLERANCE, TIGHTEST_TOLERANCE = 0.1, 1e-7, 1e-13
 """The tolerance of a step as a part of that of the motion, and its bounds."""
@@ -64,21 +66,19 @@ class LaneProgram:
         """Which measures are integrals."""
         place = seen.rows(len(rows.parameters) + len(self._fixed.places))
         write = partial(lane_function, rows={row.name.lower(): int(place[row]) for row in LaneRow})
+        here = {"moment": 0, "y": 1, "p": 1 + len(rows.states)}
+        self._signs = seen.signs
         try:
-            rates, jets, self._points = (
-                write(partial(self._write, values=values, definitions=definitions))
-                for values, definitions in ((seen.slopes, {}), (seen.sight, seen.motion.definitions), (points, {}))
-            )
-            steps = seen.steps(rates.address, int(place[LaneRow.SLOPES]))
-            self._code = rates, jets, *map(write, (steps.probe, steps.advance, steps.compare))
+            rates = write(partial(self._write, values=seen.slopes, definitions={}))
+            jets = write(partial(self._write, values=seen.sight, definitions=seen.motion.definitions))
+            self._points = lane_function(partial(self._write, values=points, definitions={}), here)
+            ends = ((code.address, int(place[row])) for code, row in ((rates, LaneRow.SLOPES), (jets, LaneRow.SIGHT)))
+            steps = seen.steps(*ends)
+            self._code = rates, jets, *map(write, (steps.probe, steps.advance, steps.look))
         except NumbaError as error:
             raise CompileError(f"A law has no machine code: {error}") from error
-        addresses = {name: code.address for name, code in zip(LaneTables._fields, self._code, strict=False)}
-        self._tables = LaneTables(
-            **addresses, first=place, states=len(rows.states), moving=seen.moving, guards=self.guards + self.free,
-            free=self.free, extremes=np.array([*enumerate(k for k, _ in seen.signs)], dtype=np.int64).reshape(-1, 2),
-            signs=np.array([sign for _, sign in seen.signs]),
-        )  # fmt: skip
+        counts = len(rows.states), seen.moving, len(seen.signs), self.guards + self.free, self.free
+        self._tables = np.array([*place, *(code.address for code in self._code[2:]), *counts])
 
     def _write(self, body: LaneBody, values: Sequence[Expr], definitions: Mapping[Dummy, Expr]) -> None:
         terms = Terms(body, self._fixed, self._places)
@@ -91,17 +91,53 @@ class LaneProgram:
         """(parameters, k) those of the model and what is fixed by them, from those of the model alone."""
         return np.concatenate([p, self._fixed.values(p)])
 
-    def follow(self, course: LaneCourse, sizes: Array, rtol: float, span: tuple[float, float]) -> None:
+    def follow(self, course: LaneCourse, sizes: Array, rtol: float, span: tuple[float, float]) -> LaneEnd:
         """Follow variants up to a guard, their end, or what they cannot pass.
 
         Args:
-            course: of all of them; it is changed in place.
+            course: of all of them.
             sizes: (n,) nominal, of the states.
             rtol: relative tolerance.
             span: start and end of the motion, s.
         """
-        tolerance = min(max(OF_A_STEP * rtol, TIGHTEST_TOLERANCE), LOOSEST_TOLERANCE)
-        follow(*self._tables, *course, sizes, np.array([tolerance, (span[1] - span[0]) / 50, span[1]]))
+        rows, states = self._rows(course, sizes, rtol, span), len(sizes)
+        now, probe, there = np.zeros((3, self._tables[LaneRow.HEIGHT], LANES))
+        now[LaneRow.VARIANT] = -1
+        follow(self._tables, rows, now, probe, there, np.zeros((LANES * JET, 10)), float(span[1]))
+        best, x = course.best.copy(), self._array(rows, LaneRow.X)
+        for (measure, _), values in zip(self._signs, self._array(rows, LaneRow.BEST), strict=True):
+            best[measure] = np.maximum(best[measure], values)
+        return LaneEnd(
+            rows[LaneRow.TIME], x[:states], best, rows[LaneRow.STEP], x[states:], rows[LaneRow.MET].astype(int)
+        )
+
+    def _array(self, rows: Array, name: LaneRow) -> Array:
+        return rows[self._tables[name] : self._tables[name + 1]]
+
+    def _rows(self, course: LaneCourse, sizes: Array, rtol: float, span: tuple[float, float]) -> Array:
+        """What is loaded of each variant, in columns."""
+        rows, measures = np.zeros((self._tables[LaneRow.Y], course.t.size)), [measure for measure, _ in self._signs]
+        rows[LaneRow.TOLERANCE] = min(max(OF_A_STEP * rtol, TIGHTEST_TOLERANCE), LOOSEST_TOLERANCE)
+        rows[LaneRow.LONGEST], rows[LaneRow.ACTIVE], rows[LaneRow.MET] = (span[1] - span[0]) / 50, 1.0, Met.A_LIMIT
+        values: dict[LaneRow, Any] = {
+            LaneRow.VARIANT: range(course.t.size),
+            LaneRow.TIME: course.t,
+            LaneRow.HIGH: course.highs,
+            LaneRow.END: course.ends,
+            LaneRow.STEP: course.steps,
+            LaneRow.BEGUN: course.t,
+            LaneRow.NOMINAL: sizes[:, None],
+            LaneRow.BEST: course.best[measures],
+            LaneRow.LOWS: np.inf,
+            LaneRow.SIGNS: np.array([sign for _, sign in self._signs])[:, None],
+            LaneRow.SIDES: course.sides,
+            LaneRow.OFFSETS: course.offsets,
+            LaneRow.P: course.p,
+        }
+        for row, value in values.items():
+            self._array(rows, row)[:] = value
+        self._array(rows, LaneRow.X)[: len(sizes)] = course.x
+        return rows
 
     def points(self, t: Array, x: Array, p: Array) -> dict[str, Array]:
         """Rates, guards, what is shown and what is stored, (values, k) each, of k variants.
@@ -111,9 +147,15 @@ class LaneProgram:
             x: (n, k) states.
             p: (parameters, k) with what is fixed by them.
         """
-        counts = [len(part) for part in self._parts.values()]
-        values, tables = np.empty((sum(counts), t.size)), self._tables
-        _evaluate(self._points.address, tables.first, t, np.ascontiguousarray(x), np.ascontiguousarray(p), values)
+        counts, blocks = [len(part) for part in self._parts.values()], -(-t.size // LANES)
+        count = 1 + len(x) + len(p)
+        rows, memory = np.zeros((count, blocks * LANES)), np.empty((blocks, count + sum(counts), LANES))
+        rows[0, : t.size], rows[1 : 1 + len(x), : t.size], rows[1 + len(x) :, : t.size] = t, x, p
+        memory[:, :count] = rows.reshape(count, blocks, LANES).swapaxes(0, 1)
+        run, start, length = self._points.ctypes, memory.ctypes.data, memory.strides[0]
+        for block in range(blocks):
+            run(start + block * length, count)
+        values = memory[:, count:].swapaxes(0, 1).reshape(sum(counts), blocks * LANES)[:, : t.size]
         return dict(zip(self._parts, np.split(values, np.cumsum(counts)[:-1]), strict=True))
 
 
@@ -143,11 +185,11 @@ class _Seen:
             self.sight += [quantity, *(slope(quantity, rows.states[k]) for k in columns)]
         self._judged, self._integrals = judged, [(judged[quantity], power) for quantity, power in integrated]
 
-    def steps(self, rates: int, first: int) -> StepWriter:
-        """What makes steps, with the address of the slopes and their first row."""
+    def steps(self, slopes: tuple[int, int], sight: tuple[int, int]) -> StepWriter:
+        """What makes steps, with addresses and first rows of slopes and sight."""
         signs = [sign for _, sign in self.signs]
         return StepWriter(
-            rates, first, len(self.slopes), self._states, self._integrals, [*self._judged.values()], signs,
+            slopes, sight, len(self.slopes), self._states, self._integrals, [*self._judged.values()], signs,
             self._watched,
         )  # fmt: skip
 
@@ -159,7 +201,7 @@ class _Seen:
         sizes = {"nominal": states, "x": moving, "y": moving, "new": moving, "last_x": moving}
         sizes |= {"slopes": STAGES * slopes, "fifth": slopes, "third": slopes, "fifths": states, "thirds": states}
         sizes |= {"sight": len(self.sight), "last_sight": JET * (extremes + watched), "best": extremes}
-        sizes |= {"lows": extremes, "sides": watched, "offsets": watched, "p": parameters}
+        sizes |= {"lows": extremes, "signs": extremes, "sides": watched, "offsets": watched, "p": parameters}
         return np.cumsum([0, *(sizes.get(row.name.lower(), 1) for row in LaneRow if row is not LaneRow.HEIGHT)])
 
 
@@ -205,21 +247,3 @@ class _Derivatives:
             self._named[symbol] = Dummy(real=True)
             self.definitions[self._named[symbol]] = rate
         return self._named[symbol]
-
-
-@compiled()
-def _evaluate(function, first, t, x, p, values):  # type: ignore[no-untyped-def]
-    """Write the values (rows, k) of a function at times (k,), states (n, k) and parameters (parameters, k)."""
-    memory = np.zeros((first[LaneRow.HEIGHT.value] + values.shape[0], LANES))
-    for start in range(0, t.size, LANES):
-        for lane in range(LANES):
-            variant = min(start + lane, t.size - 1)
-            memory[LaneRow.MOMENT.value, lane] = t[variant]
-            for row in range(x.shape[0]):
-                memory[first[LaneRow.Y.value] + row, lane] = x[row, variant]
-            for row in range(p.shape[0]):
-                memory[first[LaneRow.P.value] + row, lane] = p[row, variant]
-        run_at(function, memory, first[LaneRow.HEIGHT.value])
-        for lane in range(min(LANES, t.size - start)):
-            for row in range(values.shape[0]):
-                values[row, start + lane] = memory[first[LaneRow.HEIGHT.value] + row, lane]

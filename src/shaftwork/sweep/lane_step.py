@@ -51,8 +51,9 @@ class StepWriter:
     together.
 
     Args:
-        slopes: address of what writes the slopes at y and the moment.
-        first: the row of the first slopes; those of all stages are behind each other.
+        slopes: address of what writes the slopes at y and the moment, and the row of the first ones; those of all
+            stages are behind each other.
+        sight: address of what writes what is seen there, and its first row.
         count: of slopes.
         states: how many there are; the integrals follow them, as quantities and powers.
         integrals: which of the judged quantities is integrated, and to which power.
@@ -63,8 +64,8 @@ class StepWriter:
 
     def __init__(
         self,
-        slopes: int,
-        first: int,
+        slopes: tuple[int, int],
+        sight: tuple[int, int],
         count: int,
         states: int,
         integrals: Sequence[tuple[Judged, int]],
@@ -72,14 +73,16 @@ class StepWriter:
         signs: Sequence[float],
         guards: int,
     ) -> None:
-        self._slopes, self._first, self._count, self._states = slopes, first, count, states
+        (self._slopes, self._first), self._sight = slopes, sight
+        self._count, self._states = count, states
         self._integrals, self._judged = integrals, judged
         self._signs, self._guards = signs, guards
 
     def probe(self, body: LaneBody) -> None:
-        """Write a step of the given size, without its error."""
+        """Write a step of the given size, without its error, and what is seen at its end."""
         self._begin(body)
         self._stages(body.read("size", 0))
+        self._see("new", "end")
 
     def advance(self, body: LaneBody) -> None:
         """Write a step that is made where its error is small enough, and the length of the next one."""
@@ -111,9 +114,13 @@ class StepWriter:
         number = build.fcmp_ordered("ord", error, error)
         body.put("step", 0, build.select(number, self._product(size, factor), body.number(math.nan)))
 
-    def compare(self, body: LaneBody) -> None:
-        """Write the ends of the last steps into the extremes, and where more is to be looked at."""
+    def look(self, body: LaneBody) -> None:
+        """Write what there is at the start of a step, the ends of the last one into the extremes, and where more is to
+        be looked at.
+        """
         self._begin(body)
+        self._see("x", "time")
+        body.run(self._slopes, self._first)
         build, zero = body.builder, body.number(0.0)
         self._size = self._difference(body.read("time", 0), body.read("last_time", 0))
         moved, close = build.fcmp_ordered(">", body.read("moved", 0), zero), body.bit(value=False)
@@ -142,6 +149,14 @@ class StepWriter:
         self._body = body
         self._moving = self._states + len(self._integrals)
         self._jets = JET * (len(self._signs) + self._guards)
+
+    def _see(self, name: str, time: str) -> None:
+        """Write what is seen at some states and a time."""
+        body = self._body
+        with body.loop(0, self._moving) as row:
+            body.put("y", 0, body.read(name, 0, row), row)
+        body.put("moment", 0, body.intrinsic("minnum", body.read(time, 0), body.read("high", 0)))
+        body.run(*self._sight)
 
     def _where(self, good: Any, name: str, other: str, count: int) -> None:
         """Write rows of another array into those of one where something holds."""

@@ -17,7 +17,10 @@ class Met(IntEnum):
 
 
 class LaneRow(IntEnum):
-    """What stands in the memory of a block of lanes: what has one row, of which this is the number, and then arrays."""
+    """What stands in the memory of a block of lanes: what has one row, of which this is the number, and then arrays.
+
+    Those before Y are there for each variant as well, and are loaded where it takes a lane.
+    """
 
     TOLERANCE = 0
     """Of a step."""
@@ -34,7 +37,7 @@ class LaneRow(IntEnum):
     END = 6
     """Up to which a lane goes, s."""
     STEP = 7
-    """Length of the next step, s."""
+    """Length of the next step, s; of a variant that of the last one."""
     ACTIVE = 8
     """1 where a lane is on its way."""
     MOVED = 9
@@ -47,78 +50,73 @@ class LaneRow(IntEnum):
     """At the start of the last good step, s."""
     BEGUN = 13
     """Time at which the lane began, s."""
-    NOMINAL = 14
+    VARIANT = 14
+    """Which one is in a lane; -1 for none."""
+    MET = 15
+    """What a variant has met."""
+    NOMINAL = 16
     """Nominal sizes of the states."""
-    X = 15
+    X = 17
     """States and integrals at the start of a step."""
-    Y = 16
-    """The same at the moment."""
-    NEW = 17
-    """The same at the end."""
-    LAST_X = 18
-    """The same at the start of the last good step."""
-    SLOPES = 19
-    """Of states, integrals and what is blind, stage by stage."""
-    FIFTH = 20
-    """What a method of order 5 misses of all slopes."""
-    THIRD = 21
-    """The same by one of order 3."""
-    FIFTHS = 22
-    """Squares of that over what is allowed, of the states."""
-    THIRDS = 23
-    """The same by order 3."""
-    SIGHT = 24
-    """Jets of what is seen, and values and gradients of what is judged."""
-    LAST_SIGHT = 25
-    """Jets at the start of the last good step."""
-    BEST = 26
+    BEST = 18
     """Largest values so far, of extremes."""
-    LOWS = 27
+    LOWS = 19
     """And the lowest."""
-    SIDES = 28
+    SIGNS = 20
+    """Of extremes: times which a quantity is the largest."""
+    SIDES = 21
     """On which guards are met; 0 where one is not watched."""
-    OFFSETS = 29
+    OFFSETS = 22
     """How far beyond zero they have to go."""
-    P = 30
+    P = 23
     """Parameters."""
-    HEIGHT = 31
+    Y = 24
+    """States and integrals at the moment."""
+    NEW = 25
+    """The same at the end of a step."""
+    LAST_X = 26
+    """The same at the start of the last good step."""
+    SLOPES = 27
+    """Of states, integrals and what is blind, stage by stage."""
+    FIFTH = 28
+    """What a method of order 5 misses of all slopes."""
+    THIRD = 29
+    """The same by one of order 3."""
+    FIFTHS = 30
+    """Squares of that over what is allowed, of the states."""
+    THIRDS = 31
+    """The same by order 3."""
+    SIGHT = 32
+    """Jets of what is seen, and values and gradients of what is judged."""
+    LAST_SIGHT = 33
+    """Jets at the start of the last good step."""
+    HEIGHT = 34
     """Behind all of them."""
 
 
-class LaneTables(NamedTuple):
-    """The functions of a program, by address, and where its numbers stand.
+class LaneNumber(IntEnum):
+    """What is told about lanes, behind the first rows of what is in their memory."""
 
-    Args:
-        rates: writes the slopes at y and the moment.
-        jets: writes what is seen there.
-        probe: makes a step of a given size.
-        advance: makes a step that is as long as the tolerance lets it be.
-        compare: looks at the ends of the last step.
-        first: (LaneRow.HEIGHT + 1,) the first row of each array.
-        states: how many; integrals follow them,
-        moving: and so many are both.
-        guards: how many of those seen are guards and switches; they come last.
-        free: how many of these are switches of laws; they come last.
-        extremes: (extremes, 2) which of those seen, and the row of its largest value.
-        signs: (extremes,) times which it is the largest.
-    """
-
-    rates: int
-    jets: int
-    probe: int
-    advance: int
-    compare: int
-    first: Index
-    states: int
-    moving: int
-    guards: int
-    free: int
-    extremes: Index
-    signs: Array
+    PROBE = LaneRow.HEIGHT + 1
+    """Address of what makes a step of a given size, and writes what is seen behind it."""
+    ADVANCE = LaneRow.HEIGHT + 2
+    """Of what makes a step that is as long as the tolerance lets it be."""
+    LOOK = LaneRow.HEIGHT + 3
+    """Of what writes the first slopes and what is seen at the start of a step, and looks at the last one."""
+    STATES = LaneRow.HEIGHT + 4
+    """How many; integrals follow them,"""
+    MOVING = LaneRow.HEIGHT + 5
+    """and so many are both."""
+    EXTREMES = LaneRow.HEIGHT + 6
+    """How many; what they are of is seen first."""
+    GUARDS = LaneRow.HEIGHT + 7
+    """How many of those seen behind them are guards and switches."""
+    FREE = LaneRow.HEIGHT + 8
+    """How many of these are switches of laws; they come last."""
 
 
 class LaneCourse(NamedTuple):
-    """Variants on their way; time, states, integrals, largest values and what is met change in place.
+    """Variants on their way.
 
     Args:
         t: (k,) s.
@@ -128,10 +126,8 @@ class LaneCourse(NamedTuple):
         highs: (k,) the latest times at which anything is evaluated, s: just before a jump at the end.
         sides: (guards, k) on which a guard is met; 0 where it is not watched.
         offsets: (guards, k) how far beyond zero each has to go.
-        integrals: (integrals, k); what is added to them.
-        best: (rows, k) largest values so far.
+        best: (measures, k) largest values so far.
         steps: (k,) the length of the last step, which the next is tried with, s.
-        met: (k,) guards, THE_END or A_LIMIT.
     """
 
     t: Array
@@ -141,7 +137,22 @@ class LaneCourse(NamedTuple):
     highs: Array
     sides: Array
     offsets: Array
-    integrals: Array
     best: Array
     steps: Array
+
+
+class LaneEnd(NamedTuple):
+    """Where variants have come to.
+
+    Args:
+        t, x, best, steps: as in `LaneCourse`.
+        integrals: (integrals, k).
+        met: (k,) guards, THE_END or A_LIMIT.
+    """
+
+    t: Array
+    x: Array
+    best: Array
+    steps: Array
+    integrals: Array
     met: Index
