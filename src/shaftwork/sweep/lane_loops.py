@@ -46,8 +46,11 @@ def _repeat(tables, now, probe, lane):  # type: ignore[no-untyped-def]
 def _probe(tables, probe, t):  # type: ignore[no-untyped-def]
     """Follow the lane in a probe up to a time in s, and see what is there."""
     _fill(probe, LaneRow.SIZE.value, t - probe[LaneRow.TIME.value, 0])
-    _fill(probe, LaneRow.END.value, t)
     run_at(tables[LaneNumber.PROBE.value], probe, 0)
+    for row in range(tables[LaneNumber.MOVING.value]):
+        _fill(probe, tables[LaneRow.Y.value] + row, probe[tables[LaneRow.NEW.value] + row, 0])
+    _fill(probe, LaneRow.MOMENT.value, min(t, probe[LaneRow.HIGH.value, 0]))
+    run_at(tables[LaneNumber.JETS.value], probe, tables[LaneRow.SIGHT.value])
 
 
 @inner

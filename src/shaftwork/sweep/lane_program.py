@@ -74,11 +74,13 @@ class LaneProgram:
             self._points = lane_function(partial(self._write, values=points, definitions={}), here)
             ends = ((code.address, int(place[row])) for code, row in ((rates, LaneRow.SLOPES), (jets, LaneRow.SIGHT)))
             steps = seen.steps(*ends)
-            self._code = rates, jets, *map(write, (steps.probe, steps.advance, steps.look))
+            probe = write(steps.probe)
+            advance = write(partial(steps.advance, probe=probe.address))
+            self._code = rates, jets, probe, advance, write(steps.look)
         except NumbaError as error:
             raise CompileError(f"A law has no machine code: {error}") from error
         counts = len(rows.states), seen.moving, len(seen.signs), self.guards + self.free, self.free
-        self._tables = np.array([*place, *(code.address for code in self._code[2:]), *counts])
+        self._tables = np.array([*place, *(code.address for code in self._code[1:]), *counts])
 
     def _write(self, body: LaneBody, values: Sequence[Expr], definitions: Mapping[Dummy, Expr]) -> None:
         terms = Terms(body, self._fixed, self._places)

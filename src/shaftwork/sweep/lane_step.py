@@ -79,19 +79,24 @@ class StepWriter:
         self._signs, self._guards = signs, guards
 
     def probe(self, body: LaneBody) -> None:
-        """Write a step of the given size, without its error, and what is seen at its end."""
+        """Write a step of the given size, without its error."""
         self._begin(body)
         self._stages(body.read("size", 0))
-        self._see("new", "end")
 
-    def advance(self, body: LaneBody) -> None:
-        """Write a step that is made where its error is small enough, and the length of the next one."""
+    def advance(self, body: LaneBody, probe: int) -> None:
+        """Write a step that is made where its error is small enough, and the length of the next one.
+
+        Args:
+            body: where it writes.
+            probe: address of what makes the step.
+        """
         self._begin(body)
         time, end = body.read("time", 0), body.read("end", 0)
         wanted = body.intrinsic("minnum", body.read("step", 0), body.read("longest", 0))
         left = self._difference(end, time)
         body.put("size", 0, size := body.intrinsic("minnum", wanted, left))
-        self._stages(size)
+        body.run(probe, 0)
+        self._size = size
         with body.loop(0, self._count) as row:
             for name, weights in (("fifth", DOP853.E5), ("third", DOP853.E3)):
                 body.put(name, 0, self._weighted(weights, row), row)
@@ -119,7 +124,10 @@ class StepWriter:
         be looked at.
         """
         self._begin(body)
-        self._see("x", "time")
+        with body.loop(0, self._moving) as row:
+            body.put("y", 0, body.read("x", 0, row), row)
+        body.put("moment", 0, body.intrinsic("minnum", body.read("time", 0), body.read("high", 0)))
+        body.run(*self._sight)
         body.run(self._slopes, self._first)
         build, zero = body.builder, body.number(0.0)
         self._size = self._difference(body.read("time", 0), body.read("last_time", 0))
@@ -149,14 +157,6 @@ class StepWriter:
         self._body = body
         self._moving = self._states + len(self._integrals)
         self._jets = JET * (len(self._signs) + self._guards)
-
-    def _see(self, name: str, time: str) -> None:
-        """Write what is seen at some states and a time."""
-        body = self._body
-        with body.loop(0, self._moving) as row:
-            body.put("y", 0, body.read(name, 0, row), row)
-        body.put("moment", 0, body.intrinsic("minnum", body.read(time, 0), body.read("high", 0)))
-        body.run(*self._sight)
 
     def _where(self, good: Any, name: str, other: str, count: int) -> None:
         """Write rows of another array into those of one where something holds."""

@@ -97,21 +97,23 @@ class LaneRow(IntEnum):
 class LaneNumber(IntEnum):
     """What is told about lanes, behind the first rows of what is in their memory."""
 
-    PROBE = LaneRow.HEIGHT + 1
-    """Address of what makes a step of a given size, and writes what is seen behind it."""
-    ADVANCE = LaneRow.HEIGHT + 2
+    JETS = LaneRow.HEIGHT + 1
+    """Address of what writes what is seen at y and the moment."""
+    PROBE = LaneRow.HEIGHT + 2
+    """Of what makes a step of a given size."""
+    ADVANCE = LaneRow.HEIGHT + 3
     """Of what makes a step that is as long as the tolerance lets it be."""
-    LOOK = LaneRow.HEIGHT + 3
+    LOOK = LaneRow.HEIGHT + 4
     """Of what writes the first slopes and what is seen at the start of a step, and looks at the last one."""
-    STATES = LaneRow.HEIGHT + 4
+    STATES = LaneRow.HEIGHT + 5
     """How many; integrals follow them,"""
-    MOVING = LaneRow.HEIGHT + 5
+    MOVING = LaneRow.HEIGHT + 6
     """and so many are both."""
-    EXTREMES = LaneRow.HEIGHT + 6
+    EXTREMES = LaneRow.HEIGHT + 7
     """How many; what they are of is seen first."""
-    GUARDS = LaneRow.HEIGHT + 7
+    GUARDS = LaneRow.HEIGHT + 8
     """How many of those seen behind them are guards and switches."""
-    FREE = LaneRow.HEIGHT + 8
+    FREE = LaneRow.HEIGHT + 9
     """How many of these are switches of laws; they come last."""
 
 
