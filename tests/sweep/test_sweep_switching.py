@@ -94,6 +94,19 @@ def test_a_gap_a_brake_and_a_friction_are_followed_side_by_side() -> None:
     assert compared(NETWORKS["gap, brake and friction"](), 1.2, 1e-7).why == ""
 
 
+def test_the_bits_of_variants_that_switch_do_not_depend_on_those_beside_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    random, sweeps = np.random.default_rng(8), []
+    samples = {"J1.J": random.uniform(20.0, 35.0, 40), "shaft.gap": random.uniform(0.001, 0.01, 40)}
+    for size in (40, 7, 1):
+        monkeypatch.setattr("shaftwork.sweep.sweep_task.CHUNK", size)
+        net = NETWORKS["gap, brake and friction"]()
+        sweeps.append(sweep(net, samples=samples, t_end=1.2, measures=MEASURES, processes=1))
+    for made in sweeps:
+        assert made.why == sweeps[0].why
+        for name in MEASURES:
+            assert made.measures[name].tobytes() == sweeps[0].measures[name].tobytes()
+
+
 def test_the_instant_at_which_a_motor_is_switched_off_may_vary() -> None:
     """An inertia without losses has the speed that the torque has given it up to then."""
     off = np.linspace(0.2, 0.8, 16)
