@@ -132,6 +132,15 @@ def test_a_second_sweep_on_a_store_is_refused_and_the_first_goes_on(tmp_path: Pa
     assert made[0].measures["peak"].tobytes() == swept(path, peak=peak).measures["peak"].tobytes()
 
 
+def test_a_folder_that_may_not_be_written_to_is_named(tmp_path: Path) -> None:
+    (tmp_path / "shared").mkdir(mode=0o500)
+    path = (
+        Path("/proc/store.sqlite") if os.access(tmp_path / "shared", os.W_OK) else tmp_path / "shared" / "store.sqlite"
+    )
+    with pytest.raises(sw.ParameterError, match=r"store\.sqlite' cannot be used: .*that exists and may be written to"):
+        swept(path)
+
+
 def test_what_is_no_file_is_no_store(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     for place in (tmp_path / "pipe", tmp_path, Path("/dev/null")):

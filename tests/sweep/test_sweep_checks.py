@@ -139,3 +139,11 @@ def test_a_script_without_a_guard_is_told_so_once(tmp_path: Path) -> None:
     assert "must do so under 'if __name__ == \"__main__\":'" in told.splitlines()[-1]
     assert "bootstrapping" not in told
     assert "spawn" not in told
+
+
+def test_a_grid_of_absurd_size_is_refused_with_its_number() -> None:
+    net = train(sw.Damper("d", d=0.2))
+    values = np.linspace(1.0, 2.0, 1280)
+    grid = {"J.J": values, "d.d": values, "motor.tau": values}
+    with pytest.raises(sw.ParameterError, match=r"A grid of 1280 x 1280 x 1280 values has 2097152000 variants"):
+        sw.studies.sweep(net, grid, t_end=0.1, measures=["end J.omega"])

@@ -31,8 +31,7 @@ def on_cluster(worker: Worker, task: Task, variants: Index, client: Any) -> Iter
 
     Raises:
         ParameterError: it is no client, or a measure cannot be sent.
-        SimulationError: the scheduler is gone, workers have other libraries, or are lost again and again with the same
-            variant.
+        SimulationError: the scheduler is gone, or workers have other libraries or are lost with most of what they run.
     """
     distributed = imported("distributed", "cluster", "sweep(on=...)")
     if not isinstance(client, distributed.Client):
@@ -75,7 +74,12 @@ class _Calls:
         self._head = head, libraries(), worker.why
         self._rest = parted(variants, 8 * worker.chunk)[::-1]
         self._done: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._each, self._room, self._looked, self._busy, self._told = 2, 0, -np.inf, time.monotonic(), False
+        self._suspected: list[Index] = []
+        self._alone: Any = None
+        """What workers were lost with, and what of it runs, beside nothing else: Dask blames all at a worker."""
+        self._calls, self._fatal = 0, 0
+        """How many calls were done, and variants at which workers die."""
+        self._room, self._looked, self._busy, self._told = 0, -np.inf, time.monotonic(), False
         self.waiting: dict[Any, Index] = {}
         """Variants by future."""
 
@@ -83,15 +87,21 @@ class _Calls:
         """Send as much as keeps the cluster busy, which may grow meanwhile; whether anything waits."""
         if (now := time.monotonic()) > self._looked + 1.0:
             threads = sum(self._client.nthreads().values())
-            self._room, self._looked = self._each * max(1, threads), now
+            self._room, self._looked = 2 * max(1, threads), now
             self._busy = now if threads else self._busy
             self._say_idle(now - self._busy)
-        while self._rest and len(self.waiting) < self._room:
-            variants = self._rest.pop()
-            future = self._client.submit(measured, *self._head, variants, self._task.rows(variants), pure=False)
-            self.waiting[future] = variants
-            future.add_done_callback(self._done.put)
+        if self._suspected and not self.waiting:
+            self._alone = self._send(self._suspected.pop())
+        while self._rest and not self._suspected and self._alone is None and len(self.waiting) < self._room:
+            self._send(self._rest.pop())
         return bool(self.waiting)
+
+    def _send(self, variants: Index) -> Any:
+        """The future of some variants."""
+        future = self._client.submit(measured, *self._head, variants, self._task.rows(variants), pure=False)
+        self.waiting[future] = variants
+        future.add_done_callback(self._done.put)
+        return future
 
     def _say_idle(self, idle: float) -> None:
         """What is said where there have been no workers for a time in s.
@@ -101,8 +111,8 @@ class _Calls:
         """
         text = "The cluster has had no workers for {} minutes. Their logs tell why."
         local = self._client.cluster is None or isinstance(self._client.cluster, self._distributed.LocalCluster)
-        if idle > 600.0 and local:  # others may be waiting in a queue
-            raise SimulationError(f"{text.format(10)} What a store has is kept, and the same call goes on from there.")
+        if idle > 300.0 and local:  # others may be waiting in a queue
+            raise SimulationError(f"{text.format(5)} What a store has is kept, and the same call goes on from there.")
         if idle > 60.0 and not self._told:
             self._told = True
             warn(f"{text.format('some')} The sweep waits for them.", UserWarning)
@@ -114,16 +124,13 @@ class _Calls:
         except queue.Empty:
             return []
         variants = self.waiting.pop(future)
+        alone, self._alone = future is self._alone, None
         try:
             done: list[Chunk] = future.result()
         except self._distributed.KilledWorker as error:
-            if variants.size == 1:
-                raise SimulationError(
-                    f"Workers of the cluster were lost again and again with variant {variants[0]}: {error}. Their logs "
-                    "tell why; memory is the most common reason."
-                ) from None
-            self._each = 1  # Dask blames all that waits at a worker; parts take less time and memory
-            self._rest += [part for part in np.array_split(variants, 8) if part.size]
+            if alone and variants.size == 1:
+                return [self._deadly(variants, error.last_worker)]
+            self._suspected += [part for part in np.array_split(variants, 8 if alone else 1) if part.size]
             return []
         except self._distributed.client.FutureCancelledError:  # with a scheduler that may come again
             self._rest.append(variants)
@@ -137,7 +144,26 @@ class _Calls:
             ) from error
         if (count := sum(chunk.variants.size for chunk in done)) < variants.size:
             self._rest.append(variants[count:])
+        self._calls += 1
         return done
+
+    def _deadly(self, variant: Index, worker: Any) -> Chunk:
+        """What is said of a variant at which workers die.
+
+        Raises:
+            SimulationError: there are more of them than calls that were done, so that it is the workers.
+        """
+        reason = (
+            f"workers of the cluster were lost again and again with variant {variant[0]}, the last at "
+            f"{worker.address}; their logs tell why, and too little memory is the most common reason"
+        )
+        self._fatal += 1
+        if self._fatal > self._calls:
+            raise SimulationError(
+                f"W{reason[1:]}. Hardly anything else was done meanwhile. What a store has is kept, and the same call "
+                "goes on from there."
+            )
+        return Chunk(variant, np.full((1, len(self._task.measures)), np.nan), (reason,), stored=False)
 
 
 def measured(
@@ -190,7 +216,8 @@ def _packing() -> Any:
 
 def libraries() -> dict[str, str]:
     """Versions of what the digits of a result depend on."""
-    versions = {"shaftwork": str(sys.modules[__name__.partition(".")[0]].__version__)}
+    shaftwork = str(sys.modules[__name__.partition(".")[0]].__version__)
+    versions = {"shaftwork": shaftwork, "python": "{}.{}".format(*sys.version_info)}
     for name in ("numpy", "scipy", "sympy", "heyoka", "numba", "scikit-sundae"):
         try:
             versions[name] = metadata.version(name)

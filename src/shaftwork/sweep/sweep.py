@@ -151,7 +151,7 @@ def _run(task: Task, processes: int | None, on: Any, path: str | Path | None) ->
             take(chunk)
         with progress(len(task), "variants", "compiling") as show:
             for chunk in _chunks(worker, task, np.flatnonzero(open_), processes, on):
-                if store:
+                if store and chunk.stored:
                     store.append(chunk)
                 take(chunk)
                 show(len(task) - int(open_.sum()), f"{failed} failed" if failed else "sweep")

@@ -144,7 +144,7 @@ class Store:
             elif "not a database" in text:
                 reason = "is no file of a sweep. Give another name"
             elif isinstance(error, sqlite3.OperationalError) and "malformed" not in text:
-                reason = f"cannot be used: {text}. Give a file in a folder that exists"
+                reason = f"cannot be used: {text}. Give a file in a folder that exists and may be written to"
             else:
                 reason = f"is damaged: {text}. Delete the file"
             raise ParameterError(f"store = '{self._path}' {reason}.") from None

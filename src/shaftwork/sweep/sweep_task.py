@@ -100,12 +100,14 @@ class Chunk:
         values: (k, measures); NaN where a variant failed.
         reasons: k texts; empty where it did not.
         left: how many could not be followed side by side and ran one by one.
+        stored: whether a store takes it; not where computers failed, since the same call may do better.
     """
 
     variants: NDArray[np.intp]
     values: Array
     reasons: tuple[str, ...]
     left: int = 0
+    stored: bool = True
 
 
 class Worker:
