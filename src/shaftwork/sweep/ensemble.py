@@ -7,7 +7,7 @@ own side or about to be. A variant of which anything else is true is left to `Mo
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from sympy import Expr
@@ -29,6 +29,7 @@ from shaftwork.sweep.ensemble_equations import (
     VariantGroup,
     joined,
 )
+from shaftwork.sweep.lane_program import LaneProgram, lane_program
 from shaftwork.sweep.lane_tables import LaneCourse, Met
 
 
@@ -42,6 +43,7 @@ class Ensemble:
         measures: what is wanted.
         span: start and end, s.
         rtol: relative tolerance.
+        program: makes the programs, on which device; arguments as for `LaneProgram`.
 
     Raises:
         CompileError: variants of this network cannot run side by side; says why.
@@ -55,7 +57,9 @@ class Ensemble:
         measures: Sequence[Measure],
         span: tuple[float, float],
         rtol: float,
+        program: Callable[..., LaneProgram] = lane_program,
     ) -> None:
+        self._program = program
         self.model, self.names, self.measures = model, tuple(names), tuple(measures)
         self.span, self.rtol = span, rtol
         self.first = dict(first)
@@ -137,7 +141,7 @@ class Ensemble:
             CompileError: variants cannot run side by side in them.
         """
         if model not in self._codes:
-            self._codes[model] = EnsembleCode(model, guards, stores, self.measures)
+            self._codes[model] = EnsembleCode(model, guards, stores, self.measures, self._program)
         return self._codes[model]
 
     def run(self, columns: Array) -> tuple[Array, Mask]:

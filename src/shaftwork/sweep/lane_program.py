@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numba.core.errors import NumbaError
@@ -51,7 +53,7 @@ class LaneProgram:
         stored: Sequence[Expr],
     ) -> None:
         self._parts = {"rates": rows.rates, "guards": tuple(guards), "shown": tuple(quantities), "stored": stored}
-        seen = _Seen(rows, guards, quantities, kinds)
+        seen = Seen(rows, guards, quantities, kinds)
         points = [one for part in self._parts.values() for one in part]
         expressions = (*seen.slopes, *seen.motion.definitions.values(), *seen.sight, *points)
         self._fixed = Fixed(rows.parameters, (*rows.states, TIME, *seen.motion.definitions), expressions)
@@ -62,23 +64,31 @@ class LaneProgram:
         """How many guards there are, and how many switches of laws behind them."""
         self.integrated = [k for k, kind in enumerate(kinds) if kind in POWERS]
         """Which measures are integrals."""
-        place = seen.rows(len(rows.parameters) + len(self._fixed.places))
-        write = partial(lane_function, rows={row.name.lower(): int(place[row]) for row in LaneRow})
+        self._place = seen.rows(len(rows.parameters) + len(self._fixed.places))
         try:
-            rates, jets, self._points = (
-                write(partial(self._write, values=values, definitions=definitions))
-                for values, definitions in ((seen.slopes, {}), (seen.sight, seen.motion.definitions), (points, {}))
-            )
-            steps = seen.steps(rates.address, int(place[LaneRow.SLOPES]))
-            self._code = rates, jets, *map(write, (steps.probe, steps.advance, steps.compare))
+            self._points = self._function(points)
+            self._compile(seen)
         except NumbaError as error:
             raise CompileError(f"A law has no machine code: {error}") from error
+
+    def _compile(self, seen: Seen) -> None:
+        """Compile what follows a motion."""
+        place, write = self._place, self._function
+        rates, jets = write(seen.slopes), write(seen.sight, seen.motion.definitions)
+        steps = seen.steps(rates.address, int(place[LaneRow.SLOPES]))
+        self._code = rates, jets, *map(self._lanes, (steps.probe, steps.advance, steps.compare))
         addresses = {name: code.address for name, code in zip(LaneTables._fields, self._code, strict=False)}
         self._tables = LaneTables(
-            **addresses, first=place, states=len(rows.states), moving=seen.moving, guards=self.guards + self.free,
+            **addresses, first=place, states=seen.states, moving=seen.moving, guards=self.guards + self.free,
             free=self.free, extremes=np.array([*enumerate(k for k, _ in seen.signs)], dtype=np.int64).reshape(-1, 2),
             signs=np.array([sign for _, sign in seen.signs]),
         )  # fmt: skip
+
+    def _function(self, values: Sequence[Expr], definitions: Mapping[Dummy, Expr] = MappingProxyType({})) -> Any:
+        return self._lanes(partial(self._write, values=values, definitions=definitions))
+
+    def _lanes(self, write: Callable[[LaneBody], None]) -> Any:
+        return lane_function(write, {row.name.lower(): int(self._place[row]) for row in LaneRow})
 
     def _write(self, body: LaneBody, values: Sequence[Expr], definitions: Mapping[Dummy, Expr]) -> None:
         terms = Terms(body, self._fixed, self._places)
@@ -100,8 +110,7 @@ class LaneProgram:
             rtol: relative tolerance.
             span: start and end of the motion, s.
         """
-        tolerance = min(max(OF_A_STEP * rtol, TIGHTEST_TOLERANCE), LOOSEST_TOLERANCE)
-        follow(*self._tables, *course, sizes, np.array([tolerance, (span[1] - span[0]) / 50, span[1]]))
+        follow(*self._tables, *course, sizes, np.array([step_tolerance(rtol), (span[1] - span[0]) / 50, span[1]]))
 
     def points(self, t: Array, x: Array, p: Array) -> dict[str, Array]:
         """Rates, guards, what is shown and what is stored, (values, k) each, of k variants.
@@ -112,12 +121,12 @@ class LaneProgram:
             p: (parameters, k) with what is fixed by them.
         """
         counts = [len(part) for part in self._parts.values()]
-        values, tables = np.empty((sum(counts), t.size)), self._tables
-        _evaluate(self._points.address, tables.first, t, np.ascontiguousarray(x), np.ascontiguousarray(p), values)
+        values = np.empty((sum(counts), t.size))
+        _evaluate(self._points.address, self._place, t, np.ascontiguousarray(x), np.ascontiguousarray(p), values)
         return dict(zip(self._parts, np.split(values, np.cumsum(counts)[:-1]), strict=True))
 
 
-class _Seen:
+class Seen:
     """What is seen of a motion, and what of it is judged.
 
     Args:
@@ -129,9 +138,9 @@ class _Seen:
         self.signs = [(k, sign) for k, kind in enumerate(kinds) for sign in EXTREMES.get(kind, ())]
         """Of extremes the measure and the sign."""
         seen = [*(quantities[k] for k, _ in self.signs), *guards, *self.jumps]
-        self._watched, self._states = len(seen) - len(self.signs), len(rows.states)
+        self._watched, self.states = len(seen) - len(self.signs), len(rows.states)
         integrated = [(quantities[k], POWERS[kind]) for k, kind in enumerate(kinds) if kind in POWERS]
-        self.moving = self._states + len(integrated)
+        self.moving = self.states + len(integrated)
         blind = [one for one in dict.fromkeys(seen) if one.has(TIME)]
         self.slopes = (*rows.rates, *(quantity**power for quantity, power in integrated), *blind)
         self.motion, judged = _Derivatives(rows), dict[Expr, Judged]()
@@ -143,24 +152,29 @@ class _Seen:
             self.sight += [quantity, *(slope(quantity, rows.states[k]) for k in columns)]
         self._judged, self._integrals = judged, [(judged[quantity], power) for quantity, power in integrated]
 
-    def steps(self, rates: int, first: int) -> StepWriter:
+    def steps(self, rates: Any, first: int, kind: type[StepWriter] = StepWriter) -> StepWriter:
         """What makes steps, with the address of the slopes and their first row."""
         signs = [sign for _, sign in self.signs]
-        return StepWriter(
-            rates, first, len(self.slopes), self._states, self._integrals, [*self._judged.values()], signs,
+        return kind(
+            rates, first, len(self.slopes), self.states, self._integrals, [*self._judged.values()], signs,
             self._watched,
         )  # fmt: skip
 
     def rows(self, parameters: int) -> Index:
         """Where all arrays stand, one behind the other, with so many parameters; the others have one row."""
         states, moving, slopes, extremes, watched = (
-            self._states, self.moving, len(self.slopes), len(self.signs), self._watched,
+            self.states, self.moving, len(self.slopes), len(self.signs), self._watched,
         )  # fmt: skip
         sizes = {"nominal": states, "x": moving, "y": moving, "new": moving, "last_x": moving}
         sizes |= {"slopes": STAGES * slopes, "fifth": slopes, "third": slopes, "fifths": states, "thirds": states}
         sizes |= {"sight": len(self.sight), "last_sight": JET * (extremes + watched), "best": extremes}
         sizes |= {"lows": extremes, "sides": watched, "offsets": watched, "p": parameters}
         return np.cumsum([0, *(sizes.get(row.name.lower(), 1) for row in LaneRow if row is not LaneRow.HEIGHT)])
+
+
+def step_tolerance(rtol: float) -> float:
+    """The tolerance of a step for that of the motion."""
+    return min(max(OF_A_STEP * rtol, TIGHTEST_TOLERANCE), LOOSEST_TOLERANCE)
 
 
 def lane_program(

@@ -51,7 +51,7 @@ class StepWriter:
     together.
 
     Args:
-        slopes: address of what writes the slopes at y and the moment.
+        slopes: what writes the slopes at y and the moment: its address.
         first: the row of the first slopes; those of all stages are behind each other.
         count: of slopes.
         states: how many there are; the integrals follow them, as quantities and powers.
@@ -63,7 +63,7 @@ class StepWriter:
 
     def __init__(
         self,
-        slopes: int,
+        slopes: Any,
         first: int,
         count: int,
         states: int,
