@@ -53,64 +53,61 @@ class InnerSearch:
             **counts,
         }
 
-    def jet(self, memory: dict[str, Any], name: str, number: Any) -> Any:
-        """(3, lanes) a value that is watched with its derivatives, on its side and less its offset.
-
-        Args:
-            memory: of the lanes.
-            name: of the sight.
-            number: of all lanes, or (lanes,) of each.
-        """
+    def jets(self, memory: dict[str, Any], name: str) -> Any:
+        """(3, watched, lanes) all that is watched with its derivatives, on its side and less its offset, in a sight."""
         numpy, lanes = self._numpy, memory["depth"].size
-        number = numpy.broadcast_to(number, (1, lanes))
-        signs = numpy.repeat(numpy.array(self._signs)[:, None], lanes, axis=1)
-        signs = numpy.concatenate([signs, memory["sides"]])
-        offsets = numpy.concatenate([numpy.zeros((self.extremes, lanes)), memory["offsets"]])
-        jets = memory[name][: JET * self.watched].reshape(self.watched, JET, lanes)
-        jet = numpy.take_along_axis(jets, number[None], 0)[0] * self._at(signs, number)
-        return jet.at[0].add(-self._at(offsets, number))
+        signs = numpy.concatenate([numpy.repeat(self._signs[:, None], lanes, axis=1), memory["sides"]])
+        jets = signs * memory[name][: JET * self.watched].reshape(self.watched, JET, lanes).swapaxes(0, 1)
+        return jets.at[0, self.extremes :].add(-memory["offsets"])
+
+    def jet(self, memory: dict[str, Any], name: str, number: Any) -> Any:
+        """(3, lanes) that of which each lane has the number (lanes,)."""
+        return self._numpy.take_along_axis(self.jets(memory, name), number[None, None], 1)[:, 0]
 
     def _at(self, rows: Any, number: Any) -> Any:
-        return self._numpy.take_along_axis(rows, self._numpy.broadcast_to(number, (1, rows.shape[1])), 0)[0]
+        return self._numpy.take_along_axis(rows, number[None], 0)[0]
 
-    def open_peaks(self, memory: dict[str, Any], on: Any) -> None:
-        """Let the last steps of some lanes be searched for peaks."""
-        numpy = self._numpy
-        rounding = 8 * float(numpy.finfo(memory["best"].dtype).eps)
-        for k in range(self.extremes):
-            left, right = (self.jet(memory, name, k) for name in ("last_sight", "sight"))
-            for name, extreme in (("best", numpy.maximum), ("lows", numpy.minimum)):
-                value = extreme(memory[name][k], extreme(left[0], right[0]).astype(memory[name].dtype))
-                memory[name] = memory[name].at[k].set(numpy.where(on, value, memory[name][k]))
-            best = memory["best"][k]
-            near = max(TYPED, rounding) * (best - memory["lows"][k]) + rounding * abs(best)
-            self._open(memory, on, k, left, right, near)
+    def open(self, memory: dict[str, Any], close: Any, ready: Any) -> Any:
+        """Let last steps be searched, for guards if there are any, and for peaks where no guard may be met.
 
-    def open_guards(self, memory: dict[str, Any], on: Any) -> None:
-        """Let the last steps of some lanes be searched for guards; `uppers` is when each was seen exceeded."""
-        numpy, length = self._numpy, (memory["time"] - memory["last_time"])[0]
-        for guard in range(self.watched - self.extremes):
-            left, right = (self.jet(memory, name, self.extremes + guard) for name in ("last_sight", "sight"))
-            watched = on & (memory["sides"][guard] != 0.0)
-            upper = numpy.where(watched & (right[0] > 0), memory["time"][0], np.inf)
-            memory["uppers"] = memory["uppers"].at[guard].set(numpy.where(on, upper, memory["uppers"][guard]))
-            inside, beyond = self._reach(length, left, right)
-            perhaps = watched & ~(right[0] > 0) & (inside + beyond > 0)
-            near = TYPED * numpy.maximum(abs(left[0]), abs(right[0]))
-            self._open(memory, perhaps, self.extremes + guard, left, right, near)
+        Args:
+            memory: of the lanes; `uppers` is when each guard was seen exceeded.
+            close: (lanes,) whose last step is to be searched.
+            ready: (lanes,) whose peaks are to be searched.
 
-    def _open(self, memory: dict[str, Any], on: Any, number: int, left: Any, right: Any, near: Any) -> None:
-        numpy, nothing = self._numpy, self._numpy.zeros((1, on.size))
-        memory["looks"] = numpy.where(on, 0, memory["looks"])
-        memory["near"] = memory["near"].at[number].set(numpy.where(on, near, memory["near"][number]))
-        ends = memory["last_time"], left, memory["time"], right
-        self._push(memory, on, numpy.concatenate([*ends, nothing, nothing, nothing + number]))
+        Returns:
+            (lanes,) whose peaks are.
+        """
+        numpy, first = self._numpy, self.extremes
+        left, right = (self.jets(memory, name) for name in ("last_sight", "sight"))
+        inside, beyond = self._reach(memory["time"] - memory["last_time"], left, right)
+        watched, above = close & (memory["sides"] != 0.0), right[0, first:] > 0
+        uppers = numpy.where(watched & above, memory["time"], np.inf)
+        memory["uppers"] = numpy.where(close, uppers, memory["uppers"])
+        perhaps = watched & ~above & ((inside + beyond)[first:] > 0)
+        ready |= close & ~numpy.any(perhaps | (watched & above), axis=0)
+        for name, extreme in (("best", numpy.maximum), ("lows", numpy.minimum)):
+            value = extreme(memory[name], extreme(left[0, :first], right[0, :first]).astype(memory[name].dtype))
+            memory[name] = numpy.where(ready, value, memory[name])
+        best, rounding = memory["best"], 8 * float(numpy.finfo(memory["best"].dtype).eps)
+        near = max(TYPED, rounding) * (best - memory["lows"]) + rounding * abs(best)
+        beside = TYPED * numpy.maximum(abs(left[0]), abs(right[0]))[first:]
+        on = numpy.concatenate([numpy.broadcast_to(ready, best.shape), perhaps])
+        memory["near"] = numpy.where(on, numpy.concatenate([near, beside]), memory["near"])
+        memory["looks"] = numpy.where(close | ready, 0, memory["looks"])
+        low, high = (numpy.broadcast_to(memory[name], on.shape)[None] for name in ("last_time", "time"))
+        rest = numpy.zeros((3, *on.shape)).at[2].set(np.arange(self.watched)[:, None])
+        self._push(memory, on, numpy.concatenate([low, left, high, right, rest]))
+        return ready
 
-    def _push(self, memory: dict[str, Any], on: Any, interval: Any) -> None:
-        lanes, stack = on.size, memory["stack"]
-        place = self._numpy.where(on, memory["depth"] * lanes + np.arange(lanes), stack.shape[0])
-        memory["stack"] = stack.at[place].set(interval.T, mode="drop")
-        memory["depth"] = memory["depth"] + on
+    def _push(self, memory: dict[str, Any], on: Any, intervals: Any) -> None:
+        """Lay intervals (INTERVAL, k, lanes) that are marked (k, lanes) onto the stacks."""
+        numpy, stack, lanes = self._numpy, memory["stack"], on.shape[1]
+        count = numpy.cumsum(on, axis=0, dtype=np.int32)
+        place = (memory["depth"] + count - 1) * lanes + np.arange(lanes)
+        place = numpy.where(on, place, stack.shape[0]).ravel()
+        memory["stack"] = stack.at[place].set(intervals.reshape(INTERVAL, -1).T, mode="drop")
+        memory["depth"] = memory["depth"] + count[-1]
 
     def divide(self, memory: dict[str, Any], on: Any) -> None:
         """Take what was seen inside the intervals of some lanes, and divide these."""
@@ -124,8 +121,8 @@ class InnerSearch:
         low, high = interval[0], interval[4]
         missed, room = abs(memory["height"] - middle[0]), numpy.minimum(t - low, high - t)
         inner, rest = numpy.stack([t, *middle]), numpy.stack([missed, room, interval[10]])
-        for left, right in ((interval[:4], inner), (inner, interval[4:8])):
-            self._push(memory, on & ~exceeded, numpy.concatenate([left, right, rest]))
+        parts = (numpy.concatenate([*ends, rest]) for ends in ((interval[:4], inner), (inner, interval[4:8])))
+        self._push(memory, numpy.repeat((on & ~exceeded)[None], 2, axis=0), numpy.stack([*parts], axis=1))
 
     def next(self, memory: dict[str, Any], on: Any) -> Any:
         """Whether some lanes have an interval to be looked into, at their goal; those that have none are done."""

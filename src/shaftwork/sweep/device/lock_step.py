@@ -149,10 +149,11 @@ class LockStep:
         first = numpy.maximum(numpy.min(sizes, axis=0), memory["step"])
         memory["step"] = numpy.where(starting, first, memory["step"])
         memory["mode"] = numpy.where(starting, Mode.GOES, memory["mode"])
-        for guard in range(self._guards, self._sizes["sides"]):
-            jet = memory["seen"][JET * (self._sizes["best"] + guard) :][:JET]
-            first = numpy.sign(numpy.take_along_axis(jet, numpy.argmax(jet != 0, axis=0)[None], 0)[0])
-            memory["sides"] = memory["sides"].at[guard].set(numpy.where(starting, -first, memory["sides"][guard]))
+        first, free = JET * (self._sizes["best"] + self._guards), self._free
+        jets = memory["seen"][first : first + JET * free].reshape(free, JET, starting.size)
+        told = numpy.take_along_axis(jets, numpy.argmax(jets != 0, axis=1)[:, None], 1)[:, 0]
+        sides = numpy.where(starting, -numpy.sign(told), memory["sides"][self._guards :])
+        memory["sides"] = memory["sides"].at[self._guards :].set(sides)
 
     def _turn(self, memory: dict[str, Any]) -> None:
         """Tell what each lane does next."""
@@ -168,14 +169,12 @@ class LockStep:
         numpy, search, mode, guarded = self._numpy, self._search, memory["mode"], self._sizes["sides"] > 0
         looking, peaks = (mode == Mode.GUARDS) | (mode == Mode.PEAKS), mode == Mode.PEAKS
         search.divide(memory, looking)
-        opened = more = close  # all of them, where there are no guards
+        ready = more = numpy.zeros_like(close)
         if guarded:
-            landed, more = self._land(memory), self._rise(memory)
-            search.open_guards(memory, close)
-            straight = close & (memory["depth"] == 0) & ~self._exceeded(memory)
-            opened = (mode == Mode.CLEARS) | straight | landed
-        search.open_peaks(memory, opened)
-        found, peaks = search.next(memory, looking | close | opened), peaks | opened
+            more = self._rise(memory)
+            ready = (mode == Mode.CLEARS) | self._land(memory)
+        ready = search.open(memory, close, ready)
+        found, peaks = search.next(memory, looking | close | ready), peaks | ready
         if guarded:
             guards = (mode == Mode.GUARDS) | close & ~peaks
             self._set(memory, guards, mode=numpy.where(found, Mode.GUARDS, Mode.CLEARS))
