@@ -64,6 +64,8 @@ def train(seed: int) -> sw.Network:
             net.add(sw.Spring(f"c{k}", c=10 ** random.uniform(2, 4), d=random.uniform(0, 3)), f"n{k - 1}", f"n{k}")
     net.add(sw.Damper("load", d=random.uniform(0.1, 2.0)), f"n{count - 1}")
     if seed % 2:
+        net.add(sw.Backlash("gap", gap=0.05, c=500.0, d=1.0), "n0", "behind")
+        net.add(sw.Inertia("loose", J=0.5), "behind")
         net.add(sw.DryFriction("friction", tau_c=random.uniform(1.0, 4.0)), f"n{count - 1}")
     return net
 

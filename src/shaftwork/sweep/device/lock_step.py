@@ -171,8 +171,8 @@ class LockStep:
         search.divide(memory, looking)
         ready = more = numpy.zeros_like(close)
         if guarded:
+            ready = (mode == Mode.CLEARS) | self._land(memory)  # before others are told to land
             more = self._rise(memory)
-            ready = (mode == Mode.CLEARS) | self._land(memory)
         ready = search.open(memory, close, ready)
         found, peaks = search.next(memory, looking | close | ready), peaks | ready
         if guarded:
