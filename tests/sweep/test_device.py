@@ -108,6 +108,7 @@ def test_the_crane_on_a_graphics_processor(crane: Sweep) -> None:
     agree(crane, single, 10 * max(single.errors.values()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [np.float64, np.float32])
 def test_functions_are_those_of_numpy(kind: Any) -> None:
     from shaftwork.codegen.machine_program import Terms
