@@ -35,7 +35,7 @@ def on_cluster(worker: Worker, task: Task, variants: Index, client: Any) -> Iter
     """
     distributed = imported("distributed", "cluster", "sweep(on=...)")
     if not isinstance(client, distributed.Client):
-        raise ParameterError(f"on = {client!r} must be a client of Dask: distributed.Client(...).")
+        raise ParameterError(f"on = {client!r} must be a client of Dask, distributed.Client(...), or 'gpu'.")
     if client.asynchronous or client.status == "closed":
         raise ParameterError(f"on = {client!r} is asynchronous or closed. Give one that is open and can be waited for.")
     calls = _Calls(worker, task, variants, client, distributed)

@@ -8,7 +8,7 @@ tells what follows, for this lane alone. A variant that is stiff, or that comes 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -31,6 +31,7 @@ from shaftwork.sweep.ensemble_equations import (
     VariantGroup,
     joined,
 )
+from shaftwork.sweep.lane_program import LaneProgram, lane_program
 from shaftwork.sweep.lane_tables import LaneCourse, Met
 
 
@@ -44,6 +45,7 @@ class Ensemble:
         measures: what is wanted.
         span: start and end, s.
         rtol: relative tolerance.
+        program: makes the programs, on which device; arguments as for `LaneProgram`.
 
     Raises:
         CompileError: variants of this network cannot run side by side; says why.
@@ -57,7 +59,9 @@ class Ensemble:
         measures: Sequence[Measure],
         span: tuple[float, float],
         rtol: float,
+        program: Callable[..., LaneProgram] = lane_program,
     ) -> None:
+        self._program = program
         self.model, self.names, self.measures = model, tuple(names), tuple(measures)
         self.span, self.rtol = span, rtol
         self.first = dict(first)
@@ -139,7 +143,7 @@ class Ensemble:
             CompileError: variants cannot run side by side in them.
         """
         if model not in self._codes:
-            self._codes[model] = EnsembleCode(model, guards, stores, self.measures)
+            self._codes[model] = EnsembleCode(model, guards, stores, self.measures, self._program)
         return self._codes[model]
 
     def run(self, columns: Array) -> tuple[Array, Mask]:

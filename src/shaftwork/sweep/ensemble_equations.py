@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -17,7 +17,7 @@ from shaftwork.core.errors import CompileError
 from shaftwork.formulation.observables import Observables
 from shaftwork.pipeline.model import Model
 from shaftwork.results.measures import Measure
-from shaftwork.sweep.lane_program import lane_program
+from shaftwork.sweep.lane_program import LaneProgram
 from shaftwork.sweep.lane_tables import Met
 
 Mask = NDArray[np.bool_]
@@ -33,13 +33,19 @@ class EnsembleCode:
         guards: that end their modes, in states, parameters and time.
         stores: what the equations store.
         measures: what is read.
+        program: makes the program; arguments as for `LaneProgram`.
 
     Raises:
         CompileError: variants cannot run side by side in them.
     """
 
     def __init__(
-        self, model: Model, guards: Sequence[Expr], stores: StateTransfer, measures: Sequence[Measure]
+        self,
+        model: Model,
+        guards: Sequence[Expr],
+        stores: StateTransfer,
+        measures: Sequence[Measure],
+        program: Callable[..., LaneProgram],
     ) -> None:
         if model.rows is None or not model.states:
             raise CompileError("These equations have no program of their own.")
@@ -51,7 +57,7 @@ class EnsembleCode:
             raise CompileError("A measure is of a power, an energy or a place along a shaft.")
         stored = [expressed.store(name) for name in stores.names] if guards else []
         kinds = tuple(measure.kind for measure in measures)
-        self.program = lane_program(model.rows, tuple(guards), tuple(read), kinds, tuple(stored))
+        self.program = program(model.rows, tuple(guards), tuple(read), kinds, tuple(stored))
 
     def motion(self, t: Array, x: Array, p: Array) -> tuple[Array, Array]:
         """Rates (n, k) and guards (guards, k) at times (k,), states (n, k), parameters (parameters, k)."""

@@ -53,7 +53,7 @@ class LaneProgram:
         stored: Sequence[Expr],
     ) -> None:
         self._parts = {"rates": rows.rates, "guards": tuple(guards), "shown": tuple(quantities), "stored": stored}
-        seen = _Seen(rows, guards, quantities, kinds)
+        seen = Seen(rows, guards, quantities, kinds)
         points = [one for part in self._parts.values() for one in part]
         expressions = (*seen.slopes, *seen.motion.definitions.values(), *seen.sight, *points)
         self._fixed = Fixed(rows.parameters, (*rows.states, TIME, *seen.motion.definitions), expressions)
@@ -64,22 +64,26 @@ class LaneProgram:
         """How many guards there are, and how many switches of laws behind them."""
         self.integrated = [k for k, kind in enumerate(kinds) if kind in POWERS]
         """Which measures are integrals."""
-        place = seen.rows(len(rows.parameters) + len(self._fixed.places))
-        write = partial(lane_function, rows={row.name.lower(): int(place[row]) for row in LaneRow})
+        self._place, self._signs = seen.rows(len(rows.parameters) + len(self._fixed.places)), seen.signs
         here = {"moment": 0, "y": 1, "p": 1 + len(rows.states)}
-        self._signs = seen.signs
         try:
-            rates = write(partial(self._write, values=seen.slopes, definitions={}))
-            jets = write(partial(self._write, values=seen.sight, definitions=seen.motion.definitions))
             self._points = lane_function(partial(self._write, values=points, definitions={}), here)
-            ends = ((code.address, int(place[row])) for code, row in ((rates, LaneRow.SLOPES), (jets, LaneRow.SIGHT)))
-            steps = seen.steps(*ends)
-            probe = write(steps.probe)
-            advance = write(partial(steps.advance, probe=probe.address))
-            self._code = rates, jets, probe, advance, write(steps.look)
+            self._compile(seen)
         except NumbaError as error:
             raise CompileError(f"A law has no machine code: {error}") from error
-        counts = len(rows.states), seen.moving, len(seen.signs), self.guards + self.free, self.free
+
+    def _compile(self, seen: Seen) -> None:
+        """Compile what follows a motion."""
+        place = self._place
+        write = partial(lane_function, rows={row.name.lower(): int(place[row]) for row in LaneRow})
+        rates = write(partial(self._write, values=seen.slopes, definitions={}))
+        jets = write(partial(self._write, values=seen.sight, definitions=seen.motion.definitions))
+        slopes, sight = (rates.address, int(place[LaneRow.SLOPES])), (jets.address, int(place[LaneRow.SIGHT]))
+        steps = seen.steps(slopes, sight)
+        probe = write(steps.probe)
+        advance = write(partial(steps.advance, probe=probe.address))
+        self._code = rates, jets, probe, advance, write(steps.look)
+        counts = seen.states, seen.moving, len(seen.signs), self.guards + self.free, self.free
         self._tables = np.array([*place, *(code.address for code in self._code[1:]), *counts])
 
     def _write(self, body: LaneBody, values: Sequence[Expr], definitions: Mapping[Dummy, Expr]) -> None:
@@ -103,7 +107,7 @@ class LaneProgram:
             span: start and end of the motion, s.
         """
         rows, states = self._rows(course, sizes, rtol, span), len(sizes)
-        now, probe, there = np.zeros((3, self._tables[LaneRow.HEIGHT], LANES))
+        now, probe, there = np.zeros((3, self._place[LaneRow.HEIGHT], LANES))
         now[LaneRow.VARIANT] = -1
         follow(self._tables, rows, now, probe, there, np.zeros((LANES * JET, 10)), float(span[1]))
         best, x = course.best.copy(), self._array(rows, LaneRow.X)
@@ -114,12 +118,12 @@ class LaneProgram:
         )
 
     def _array(self, rows: Array, name: LaneRow) -> Array:
-        return rows[self._tables[name] : self._tables[name + 1]]
+        return rows[self._place[name] : self._place[name + 1]]
 
     def _rows(self, course: LaneCourse, sizes: Array, rtol: float, span: tuple[float, float]) -> Array:
         """What is loaded of each variant, in columns."""
-        rows, measures = np.zeros((self._tables[LaneRow.Y], course.t.size)), [measure for measure, _ in self._signs]
-        rows[LaneRow.TOLERANCE] = min(max(OF_A_STEP * rtol, TIGHTEST_TOLERANCE), LOOSEST_TOLERANCE)
+        rows, measures = np.zeros((self._place[LaneRow.Y], course.t.size)), [measure for measure, _ in self._signs]
+        rows[LaneRow.TOLERANCE] = step_tolerance(rtol)
         rows[LaneRow.LONGEST], rows[LaneRow.ACTIVE], rows[LaneRow.MET] = (span[1] - span[0]) / 50, 1.0, Met.A_LIMIT
         values: dict[LaneRow, Any] = {
             LaneRow.VARIANT: range(course.t.size),
@@ -161,7 +165,7 @@ class LaneProgram:
         return dict(zip(self._parts, np.split(values, np.cumsum(counts)[:-1]), strict=True))
 
 
-class _Seen:
+class Seen:
     """What is seen of a motion, and what of it is judged.
 
     Args:
@@ -173,9 +177,9 @@ class _Seen:
         self.signs = [(k, sign) for k, kind in enumerate(kinds) for sign in EXTREMES.get(kind, ())]
         """Of extremes the measure and the sign."""
         seen = [*(quantities[k] for k, _ in self.signs), *guards, *self.jumps]
-        self._watched, self._states = len(seen) - len(self.signs), len(rows.states)
+        self._watched, self.states = len(seen) - len(self.signs), len(rows.states)
         integrated = [(quantities[k], POWERS[kind]) for k, kind in enumerate(kinds) if kind in POWERS]
-        self.moving = self._states + len(integrated)
+        self.moving = self.states + len(integrated)
         blind = [one for one in dict.fromkeys(seen) if one.has(TIME)]
         self.slopes = (*rows.rates, *(quantity**power for quantity, power in integrated), *blind)
         self.motion, judged = _Derivatives(rows), dict[Expr, Judged]()
@@ -187,24 +191,29 @@ class _Seen:
             self.sight += [quantity, *(slope(quantity, rows.states[k]) for k in columns)]
         self._judged, self._integrals = judged, [(judged[quantity], power) for quantity, power in integrated]
 
-    def steps(self, slopes: tuple[int, int], sight: tuple[int, int]) -> StepWriter:
-        """What makes steps, with addresses and first rows of slopes and sight."""
+    def steps(self, slopes: tuple[Any, int], sight: tuple[Any, int], kind: type[StepWriter] = StepWriter) -> StepWriter:
+        """What makes steps, with what writes slopes and sight, and their first rows."""
         signs = [sign for _, sign in self.signs]
-        return StepWriter(
-            slopes, sight, len(self.slopes), self._states, self._integrals, [*self._judged.values()], signs,
+        return kind(
+            slopes, sight, len(self.slopes), self.states, self._integrals, [*self._judged.values()], signs,
             self._watched,
         )  # fmt: skip
 
     def rows(self, parameters: int) -> Index:
         """Where all arrays stand, one behind the other, with so many parameters; the others have one row."""
         states, moving, slopes, extremes, watched = (
-            self._states, self.moving, len(self.slopes), len(self.signs), self._watched,
+            self.states, self.moving, len(self.slopes), len(self.signs), self._watched,
         )  # fmt: skip
         sizes = {"nominal": states, "x": moving, "y": moving, "new": moving, "last_x": moving}
         sizes |= {"slopes": STAGES * slopes, "fifth": slopes, "third": slopes, "fifths": states, "thirds": states}
         sizes |= {"sight": len(self.sight), "last_sight": JET * (extremes + watched), "best": extremes}
         sizes |= {"lows": extremes, "signs": extremes, "sides": watched, "offsets": watched, "p": parameters}
         return np.cumsum([0, *(sizes.get(row.name.lower(), 1) for row in LaneRow if row is not LaneRow.HEIGHT)])
+
+
+def step_tolerance(rtol: float) -> float:
+    """The tolerance of a step for that of the motion."""
+    return min(max(OF_A_STEP * rtol, TIGHTEST_TOLERANCE), LOOSEST_TOLERANCE)
 
 
 def lane_program(

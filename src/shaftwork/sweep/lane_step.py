@@ -51,9 +51,9 @@ class StepWriter:
     together.
 
     Args:
-        slopes: address of what writes the slopes at y and the moment, and the row of the first ones; those of all
+        slopes: what writes the slopes at y and the moment, its address, and the row of the first ones; those of all
             stages are behind each other.
-        sight: address of what writes what is seen there, and its first row.
+        sight: what writes what is seen there, its address, and its first row.
         count: of slopes.
         states: how many there are; the integrals follow them, as quantities and powers.
         integrals: which of the judged quantities is integrated, and to which power.
@@ -64,8 +64,8 @@ class StepWriter:
 
     def __init__(
         self,
-        slopes: tuple[int, int],
-        sight: tuple[int, int],
+        slopes: tuple[Any, int],
+        sight: tuple[Any, int],
         count: int,
         states: int,
         integrals: Sequence[tuple[Judged, int]],
@@ -83,7 +83,7 @@ class StepWriter:
         self._begin(body)
         self._stages(body.read("size", 0))
 
-    def advance(self, body: LaneBody, probe: int) -> None:
+    def advance(self, body: LaneBody, probe: Any) -> None:
         """Write a step that is made where its error is small enough, and the length of the next one.
 
         Args:
@@ -120,15 +120,18 @@ class StepWriter:
         body.put("step", 0, build.select(number, self._product(size, factor), body.number(math.nan)))
 
     def look(self, body: LaneBody) -> None:
-        """Write what there is at the start of a step, the ends of the last one into the extremes, and where more is to
-        be looked at.
-        """
+        """Write what there is at the start of a step, and compare the ends of the last one."""
         self._begin(body)
         with body.loop(0, self._moving) as row:
             body.put("y", 0, body.read("x", 0, row), row)
         body.put("moment", 0, body.intrinsic("minnum", body.read("time", 0), body.read("high", 0)))
         body.run(*self._sight)
         body.run(self._slopes, self._first)
+        self.compare(body)
+
+    def compare(self, body: LaneBody) -> None:
+        """Write the ends of the last steps into the extremes, and where more is to be looked at."""
+        self._begin(body)
         build, zero = body.builder, body.number(0.0)
         self._size = self._difference(body.read("time", 0), body.read("last_time", 0))
         moved, close = build.fcmp_ordered(">", body.read("moved", 0), zero), body.bit(value=False)

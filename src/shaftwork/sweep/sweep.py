@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
+from dataclasses import replace
 from itertools import compress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -33,7 +35,10 @@ from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
 from shaftwork.sweep.sweep_result import VERDICTS, Limits, Sweep, limits_of
 from shaftwork.sweep.sweep_store import Store
-from shaftwork.sweep.sweep_task import Chunk, Index, Reader, Task, Worker, chunks
+from shaftwork.sweep.sweep_task import SIDE_BY_SIDE, Chunk, Index, Reader, Task, Worker, chunks
+
+if TYPE_CHECKING:
+    from shaftwork.sweep.device.device_lanes import Device
 
 LEFT = "a zero, a stiff motion, one without end or one that a law drives back to its jump is left to `simulate`"
 """Why variants have left those beside them."""
@@ -58,6 +63,7 @@ def sweep(
     t_eval: OutputTimes = None,
     processes: int | None = None,
     on: Any = None,
+    precision: str = "double",
     store: str | Path | None = None,
 ) -> Sweep:
     """Simulate variants of a network and measure each of them; nothing is compiled anew.
@@ -84,12 +90,14 @@ def sweep(
         steady: whether each variant starts in its own steady state at t = 0, of which `initial` changes some values.
         t_eval: output times of the solutions that functions get, as there; names measure the motion, not the outputs.
         processes: how many; by default as many as there are cores, where the sweep takes long enough.
-        on: a client of Dask, `distributed.Client(...)`, whose workers do all of it (extra `cluster`).
+        on: "gpu" for the first graphics processor that JAX sees (extra `gpu`), or a device of JAX: variants run side by
+            side there. Or a client of Dask, `distributed.Client(...)`, whose workers do all of it (extra `cluster`).
+        precision: of numbers on a graphics processor. In "single", `Sweep.errors` says how far results are off.
         store: a file to which all that is done is written. The same call with the same file goes on where it stopped.
 
     Raises:
-        ParameterError: an argument is out of its range, there is no such parameter or measure, or the store is that of
-            another sweep, in use by one, damaged, or cannot be written any more.
+        ParameterError: an argument is out of its range, there is no such parameter, measure or device, or the store is
+            that of another sweep, in use by one, damaged, or cannot be written any more.
         NetworkError: the network cannot be assembled.
         SignalError: a measure is of a quantity that does not exist.
     """
@@ -99,9 +107,43 @@ def sweep(
     limits = _limits(require, readers)
     _, end = time_span(time_of_start(None, start), t_end)
     options = _options(readers, rtol, engine, start, t_eval)
-    task = Task(net, columns, readers, _lines(sn, readers), end, options, steady)
-    values, reasons, why = _run(task, _count(processes), on, store)
-    return Sweep(net.name, columns, dict(zip(readers, values.T, strict=True)), limits, reasons, why)
+    device = _device(on, precision)
+    told = "" if device is None else precision
+    task = Task(net, columns, readers, _lines(sn, readers), end, options, steady, told)
+    worker = Worker(task, device)
+    values, reasons, why = _run(worker, task, _count(processes), on, store)
+    errors = _errors(task, values, reasons) if told == "single" and not worker.why else {}
+    return Sweep(net.name, columns, dict(zip(readers, values.T, strict=True)), limits, reasons, why, errors)
+
+
+def _device(on: Any, precision: str) -> Device | None:
+    """The graphics processor that is meant, or None.
+
+    Raises:
+        ParameterError: there is none, or no such precision there.
+        MissingExtraError: JAX is not installed.
+    """
+    jax = sys.modules.get("jax")
+    on_device = isinstance(on, str) or (jax is not None and isinstance(on, jax.Device))
+    if precision not in ("double", "single") or (precision == "single" and not on_device):
+        raise ParameterError(
+            f"precision = {precision!r} must be 'double', or 'single' on a graphics processor: on='gpu'."
+        )
+    if not on_device:
+        return None
+    from shaftwork.sweep.device.device_lanes import Device
+
+    return Device.of(on, precision)
+
+
+def _errors(task: Task, values: Array, reasons: Sequence[str]) -> dict[str, float]:
+    """By measure, the largest difference of some variants from double precision, over their largest size."""
+    good = np.flatnonzero([not reason for reason in reasons])
+    some = good[np.unique(np.linspace(0, good.size - 1, SIDE_BY_SIDE).round().astype(int))] if good.size else good
+    again = Worker(replace(task, precision="")).run(some).values
+    sizes = np.abs(again).max(axis=0, initial=0.0)
+    apart = np.abs(values[some] - again).max(axis=0, initial=0.0)
+    return dict(zip(task.measures, (apart / np.where(sizes > 0, sizes, 1.0)).tolist(), strict=True))
 
 
 def _start(net: Network, initial: Any, *, steady: bool) -> Any:
@@ -131,9 +173,10 @@ def _count(processes: int | None) -> int | None:
     return None if processes is None else count
 
 
-def _run(task: Task, processes: int | None, on: Any, path: str | Path | None) -> tuple[Array, tuple[str, ...], str]:
+def _run(
+    worker: Worker, task: Task, processes: int | None, on: Any, path: str | Path | None
+) -> tuple[Array, tuple[str, ...], str]:
     """(variants, measures), why variants failed, and why some or all ran one by one."""
-    worker = Worker(task)
     values, reasons = np.full((len(task), len(task.measures)), np.nan), [""] * len(task)
     open_, alone, failed = np.ones(len(task), dtype=bool), 0, 0
 
@@ -161,8 +204,8 @@ def _run(task: Task, processes: int | None, on: Any, path: str | Path | None) ->
 
 def _chunks(worker: Worker, task: Task, variants: Index, processes: int | None, on: Any) -> Iterator[Chunk]:
     """Chunks of variants as they are done, on this machine or on the workers of a cluster."""
-    if on is None:
-        return chunks(worker, task, variants, processes)
+    if on is None or task.precision:
+        return chunks(worker, task, variants, 1 if task.precision and not worker.why else processes)
     from shaftwork.sweep.cluster import on_cluster
 
     return on_cluster(worker, task, variants, on)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -70,6 +70,8 @@ class Sweep:
         require: limits by measure.
         reasons: why each variant failed; empty where it did not.
         why: why variants ran one by one, and how many, where some did; empty where all ran side by side.
+        errors: in single precision, by measure, how far 16 variants all over the sweep differ from double precision at
+            most, as a part of the largest value of these; else empty.
     """
 
     name: str
@@ -78,6 +80,7 @@ class Sweep:
     require: Mapping[str, Limits]
     reasons: tuple[str, ...]
     why: str = ""
+    errors: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.reasons)
@@ -136,6 +139,7 @@ class Sweep:
             self.require,
             tuple(self.reasons[k] for k in taken.tolist()),
             self.why,
+            self.errors,
         )
 
     def to_csv(self, path: str | Path) -> None:
@@ -181,6 +185,9 @@ class Sweep:
         ]
         failed = int(self.failed.sum())
         counts = f"{self.name}: {counted(len(self), 'variant')}, {int(passed.sum())} passed, {failed} failed"
+        if self.errors:
+            parts = ", ".join(f"{name} {error:.0e}" for name, error in self.errors.items())
+            counts = f"{counts}; off by single precision: {parts}"
         return counts, ["", *columns, "passed", "reason" if any(self.reasons) else ""], rows
 
     def __str__(self) -> str:

@@ -166,7 +166,8 @@ def _title(task: Task) -> dict[str, str]:
     table = hashlib.sha256()
     for name, column in task.columns.items():
         table.update(name.encode() + np.ascontiguousarray(column).tobytes())
-    options = {**task.options, **({"steady": True} if task.steady else {})}.items()
+    options = {**task.options, **({"steady": True} if task.steady else {})}
+    options |= {"precision on a graphics processor": task.precision} if task.precision else {}
     parts = "\n".join(repr(placed) for placed in task.network.netlist().placed)
     return {
         "format": "3",
@@ -175,7 +176,9 @@ def _title(task: Task) -> dict[str, str]:
         "measures": _measures(task.measures),
         "S-N lines": repr(dict(task.sn)),
         "t_end": repr(task.t_end),
-        "options": repr({name: getattr(value, "tolist", lambda value=value: value)() for name, value in options}),
+        "options": repr(
+            {name: getattr(value, "tolist", lambda value=value: value)() for name, value in options.items()}
+        ),
     }
 
 

@@ -45,11 +45,12 @@ from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
 
 if TYPE_CHECKING:
+    from shaftwork.sweep.device.device_lanes import Device
     from shaftwork.sweep.ensemble import Ensemble
 
-SIDE_BY_SIDE, CHUNK, LONE_CHUNK = 16, 2048, 8
+SIDE_BY_SIDE, CHUNK, DEVICE_CHUNK, LONE_CHUNK = 16, 2048, 65536, 8
 """Variants: from which on it is worth while to compile a program for many of them; and that are computed and stored at
-once, side by side and one by one."""
+once, side by side, on a graphics processor and one by one."""
 
 
 Index = NDArray[np.intp]
@@ -69,6 +70,7 @@ class Task:
         t_end: end of the motions, s.
         options: of `Model.simulate`.
         steady: whether each variant starts in its own steady state at t = 0.
+        precision: of variants on a graphics processor, "double" or "single"; empty where they run elsewhere.
     """
 
     network: Network
@@ -78,6 +80,7 @@ class Task:
     t_end: float
     options: Mapping[str, Any]
     steady: bool = False
+    precision: str = ""
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())))
@@ -115,6 +118,7 @@ class Worker:
 
     Args:
         task: the sweep.
+        device: where variants run side by side; None for this processor.
 
     Raises:
         NetworkError: the network cannot be assembled.
@@ -122,14 +126,14 @@ class Worker:
         SignalError: a measure or a start value is of a quantity that does not exist.
     """
 
-    def __init__(self, task: Task) -> None:
-        self._task, self._model = task, task.network.compile()
+    def __init__(self, task: Task, device: Device | None = None) -> None:
+        self._task, self._model, self._device = task, task.network.compile(), device
         self._netlist: Netlist = task.network.netlist()
         self._refuse_unknown()
         self.why = ""
         """Why variants run one by one."""
         self._ensemble = self._side_by_side()
-        self.chunk = LONE_CHUNK if self._ensemble is None else CHUNK
+        self.chunk = LONE_CHUNK if self._ensemble is None else DEVICE_CHUNK if device else CHUNK
 
     def _refuse_unknown(self) -> None:
         observer = ModelObserver(self._model.form, self._model.bind)
@@ -159,7 +163,8 @@ class Worker:
         kind, span, names = _kind_of(self._model), (0.0, task.t_end), tuple(task.columns)
         for first in (task.values(0), {}):  # the network itself, where the first variant fails
             try:
-                return kind(self._model, names, first, read, span, options["rtol"])
+                programs = () if self._device is None else (self._device.program,)
+                return kind(self._model, names, first, read, span, options["rtol"], *programs)
             except CompileError as error:
                 reason = str(error).splitlines()[0].rstrip(".")
                 self.why = reason[0].lower() + reason[1:]
