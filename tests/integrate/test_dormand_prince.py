@@ -30,7 +30,7 @@ def test_random_networks_move_as_with_scipy(pieces: Network) -> None:
     except sw.ParameterError:  # too closely coupled for rows
         assert model.machine_program is None
         return
-    # The steps are the same but for rounding: what differs is far below the tolerance, in which both are off.
+    # ten tolerances: the error of some dozen steps, in which both are off
     assert np.abs(one.x - other.x).max(initial=0.0) <= 1e-8 * np.abs(other.x).max(initial=1.0)
 
 
@@ -41,9 +41,6 @@ def test_scenes_move_as_with_scipy_through_all_their_events(scene: str) -> None:
     # 1e-6: two runs at 1e-9, each off by some hundred tolerances after dozens of events
     assert largest_difference(*runs) < 1e-6
     assert [event[1:] for event in runs[0].events] == [event[1:] for event in runs[1].events]
-    steps = [run.statistics["steps"] for run in runs]
-    # a step that is looked at closely may end a hair apart, and so may be one more
-    assert abs(steps[0] - steps[1]) <= 2 + 0.1 * steps[1]
 
 
 def test_tables_and_noise_have_machine_code() -> None:
@@ -131,3 +128,42 @@ def test_a_motion_that_laws_drive_back_to_their_jump_is_refused_as_by_scipy() ->
     net.add(sw.Inertia("J", J=1.0), "a")
     with pytest.raises(sw.SimulationError, match="drive the motion back"):
         net.simulate(1.0, engine="numba")
+
+
+def hidden_in_turning() -> sw.Network:
+    """A stiff coupling, at whose ends all turns 1e5 times as fast as it twists, and a load that swings."""
+    net = sw.Network("hidden")
+    net.add(sw.TorqueSource("motor", tau=200 - sw.omega), "a")
+    net.add(sw.Inertia("J1", J=2.0), "a")
+    net.add(sw.Spring("coupling", c=3e6, d=1500.0), "a", "b")
+    net.add(sw.Inertia("J2", J=0.05), "b")
+    net.add(sw.Spring("shaft", c=2e4, d=1.0), "b", "c")
+    net.add(sw.Inertia("J3", J=1.0), "c")
+    net.add(sw.TorqueSource("fan", tau=-0.01 * sw.omega**2 * (1 + 0.5 * sympy.sin(7 * sw.t))), "c")
+    return net
+
+
+READ = {
+    "excavator_train": ("gear 7.tau", "mesh 4.omega_rel", "motor.tau"),
+    "crane_train": ("gear 5.tau", "mesh 1.omega_rel"),
+    "hidden": ("J2.tau", "coupling.omega_rel", "coupling.tau", "shaft.omega_rel"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["heyoka"])
+@pytest.mark.parametrize("scene", READ)
+def test_what_is_a_small_difference_of_large_states_is_as_right_as_they_are(scene: str, engine: str) -> None:
+    """Net torques on gears and the twist of meshes, in the midst of a motion as at its ends; against Taylor series."""
+    net = hidden_in_turning() if scene == "hidden" else getattr(sw.scenes, scene)()
+    model, times = net.compile(), np.linspace(0.0, 1.0, 1002)[1:]
+    run = model.simulate(1.0, rtol=1e-8, engine="numba")
+    right = model.simulate(1.0, rtol=1e-12, engine=engine)  # type: ignore[arg-type]
+    values, expected = run.at(times), right.at(times)
+    for name in READ[scene]:
+        # 100 rtol at the ends of steps. Some end beyond the edge of stability, and inside these dense output of a fast
+        # motion is off by another factor of ten.
+        error = np.abs(values[name] - expected[name]).max() / np.abs(expected[name]).max()
+        assert error < 1e-5, name
+        error_at_most = np.quantile(np.abs(values[name] - expected[name]), 0.95) / np.abs(expected[name]).max()
+        assert error_at_most < 1e-6, name

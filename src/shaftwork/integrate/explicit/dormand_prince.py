@@ -15,7 +15,7 @@ import numpy as np
 from shaftwork.core.errors import ParameterError, SimulationError
 from shaftwork.integrate.crossings import RESTING, uneven
 from shaftwork.integrate.explicit.dormand_prince_loops import COURSE, advance, between, values_at
-from shaftwork.integrate.explicit.explicit_runs import MarchedRun, solid
+from shaftwork.integrate.explicit.explicit_runs import MarchedRun, stable
 from shaftwork.integrate.problem import Array, MachineRates, Problem, Trajectory, changed
 from shaftwork.integrate.smooth_intervals import GuardedFunctions, SmoothInterval, failure, pieces
 from shaftwork.integrate.stepping import Step, march, with_outputs
@@ -51,7 +51,7 @@ def solve(problem: Problem) -> Trajectory:
         return MarchedRun(whole, stepper.dense(whole.steps), counts)
 
     problem = _watching(problem, machine)
-    whole = solid(problem, run)
+    whole = stable(problem, run)
     return with_outputs(problem, whole.march, whole.dense, whole.counts)
 
 
@@ -122,6 +122,7 @@ class MachineSnapshot(NamedTuple):
         longest: a step at most, s: far from the edge of stability, so that strong dampers have right torques.
         offsets: of the guards, if there are any.
         atol: (n,) absolute tolerances; those of guards that are integrated depend on where the motion began.
+        sizes: (n,) of the rates, the largest so far.
     """
 
     t: float
@@ -131,6 +132,7 @@ class MachineSnapshot(NamedTuple):
     longest: float
     offsets: Array | None
     atol: Array
+    sizes: Array
 
 
 class MachineSteps:
@@ -148,7 +150,8 @@ class MachineSteps:
             bound = bound_of_decay(jacobians(problem))
             offsets = None if guards is None else guards.offsets
             longest = 1 / bound if bound > 0 else np.inf
-            at = MachineSnapshot(problem.t0, problem.x0, pieces(problem)[0], 0.0, longest, offsets, problem.atol)
+            piece, sizes = pieces(problem)[0], _least_rates(problem)
+            at = MachineSnapshot(problem.t0, problem.x0, piece, 0.0, longest, offsets, problem.atol, sizes)
         elif guards is not None:
             problem = changed(problem, atol=at.atol, guards=replace(guards, offsets=np.asarray(at.offsets)))
         self._problem, self._machine, self.at = _watching(problem, machine), machine, at
@@ -166,7 +169,7 @@ class MachineSteps:
             return False
         if not step.clear or step.end < end:
             return False
-        self.at = at._replace(t=end, x=step.state, length=stepper.length)
+        self.at = at._replace(t=end, x=step.state, length=stepper.length, sizes=stepper.sizes)
         return True
 
     def with_parameters(self, p: Array) -> bool:
@@ -174,6 +177,11 @@ class MachineSteps:
         self._machine = self._machine._replace(p=self._machine.values(p))
         self._problem = _watching(self._problem, self._machine)
         return True
+
+
+def _least_rates(problem: Problem) -> Array:
+    """(n,) the size of rates from which on they matter: it changes a state by its nominal size in the whole time."""
+    return np.asarray(problem.atol / problem.rtol / (problem.t_end - problem.t0))
 
 
 def _system(machine: MachineRates, low: float, high: float) -> tuple[int, int, int, float, float, Array]:
@@ -198,6 +206,7 @@ class _MachineStepper:
         self._taken, self.tried, self._steps = list[_Taken](), 0, 0
         self._clearance = CLEARANCE * float(np.spacing(max(abs(problem.t0), abs(problem.t_end))))
         self._uneven, guards, count = uneven(problem.x0.size), problem.guards, machine.guards
+        self.sizes = _least_rates(problem)
         self._course = np.zeros((COURSE, count + machine.switches))
         sides, offsets, _ = self._course[-3:]
         if guards is not None:
@@ -218,7 +227,7 @@ class _MachineStepper:
     def resume(self, at: MachineSnapshot, end: float) -> None:
         """Go on to a time in s at once."""
         self.open(at.piece, at.t, at.x)
-        self._end, self._limit, self.length = end, at.longest, at.length
+        self._end, self._limit, self.length, self.sizes = end, at.longest, at.length, at.sizes.copy()
 
     def step(self, t: float, x: Array) -> Step:
         problem, x = self._problem, np.ascontiguousarray(x)
@@ -227,7 +236,7 @@ class _MachineStepper:
         limits = np.array([t, self._end, self.length, self._limit, self._clearance, self._rested, 0.0])
         count, self.length, tried, guard, unclear = advance(
             _system(self._machine, self._piece.low, self._piece.high), self._places, self._course, limits,
-            x, problem.atol, problem.rtol, self._uneven, ends, lengths, states,
+            x, problem.atol, problem.rtol, self._uneven, self.sizes, ends, lengths, states,
         )  # fmt: skip
         self.tried += tried
         if not count:

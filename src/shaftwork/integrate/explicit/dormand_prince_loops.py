@@ -14,6 +14,7 @@ from numba import types
 from scipy.integrate import DOP853
 
 from shaftwork.integrate.crossings import LEFT, RESTING
+from shaftwork.integrate.engines import ENGINES
 from shaftwork.numerics.machine_code import MATRIX, VECTOR, call_at, compiled, inner
 from shaftwork.numerics.tolerances import EPS
 from shaftwork.numerics.zeros import LOOKS
@@ -21,11 +22,11 @@ from shaftwork.numerics.zeros import LOOKS
 STAGES, FURTHER, SHAPES = 12, 3, 7
 """Stages of a step, those that dense output needs besides the slope at the end, and the shapes that make it."""
 WEIGHTS = np.vstack([DOP853.B, DOP853.E5[:STAGES], DOP853.E3[:STAGES]])
+INSIDE, FINEST = 8, ENGINES["numba"].finest  # a stage amid a step; the finest tolerance
 BEFORE, AFTER = np.ascontiguousarray(DOP853.A), np.ascontiguousarray(DOP853.A_EXTRA)
 NODES, LATER, DENSE = DOP853.C.copy(), DOP853.C_EXTRA.copy(), np.ascontiguousarray(DOP853.D)
 PARTS = np.array([0.0, *LOOKS, 1.0])
 """Where a step near a guard or a switch is looked at, as parts of it."""
-
 
 _PLACES = types.Array(types.int64, 1, "C")
 _SYSTEM = types.Tuple((types.int64, types.int64, types.int64, types.float64, types.float64, VECTOR))  # type: ignore[no-untyped-call]
@@ -104,26 +105,40 @@ def _inside(shapes, part, y):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _error(slopes, x, new, step, atol, rtol):  # type: ignore[no-untyped-def]
-    """Of a step, in parts of its tolerance."""
-    fifth, third = 0.0, 0.0
+def _error(system, t, x, new, step, slopes, y, sizes, atol, rtol):  # type: ignore[no-untyped-def]
+    """Of a step, in parts of its tolerance: of its states or, where that is larger, of the rates inside it.
+
+    Users read rates, as the torque on an inertia and the speed of a twist: small differences of large states. What the
+    error changes in them counts against the largest so far, unless the states are as right as rounding lets them be.
+    """
+    missed, moved, states, rates = slopes[STAGES + 1], slopes[STAGES + 2], 0.0, 0.0
+    _stage(slopes, BEFORE[INSIDE], x, step, y)
     for i in range(x.size):
-        scale, a, b = atol[i] + rtol * max(abs(x[i]), abs(new[i])), 0.0, 0.0
+        fifth, third = 0.0, 0.0
         for j in range(STAGES):
-            a += WEIGHTS[1, j] * slopes[j, i]
-            b += WEIGHTS[2, j] * slopes[j, i]
-        fifth += (a / scale) ** 2
-        third += (b / scale) ** 2
-    whole = fifth + 0.01 * third
-    return step * fifth / math.sqrt(whole * x.size) if whole > 0 else whole
+            fifth += WEIGHTS[1, j] * slopes[j, i]
+            third += WEIGHTS[2, j] * slopes[j, i]
+        whole = math.sqrt(fifth**2 + 0.01 * third**2)
+        missed[i] = step * fifth * abs(fifth) / whole if whole > 0 else whole
+        states += (missed[i] / (atol[i] + rtol * max(abs(x[i]), abs(new[i])))) ** 2
+        y[i] += missed[i]
+    states = math.sqrt(states / max(x.size, 1))
+    if not 0 < states < 1:
+        return states
+    _rates(system, t + NODES[INSIDE] * step, y, moved)
+    for i in range(x.size):
+        change, sizes[i] = moved[i] - slopes[INSIDE, i], max(sizes[i], abs(slopes[0, i]), abs(slopes[INSIDE, i]))
+        rates += (change / (rtol * sizes[i])) ** 2 if change != 0 else 0.0
+    rates = math.sqrt(rates / x.size)
+    return min(rates, states * rtol / FINEST) if rates > states else states
 
 
 @inner
-def _factor(error, most):  # type: ignore[no-untyped-def]
-    """How many times as long the next step may be."""
+def _factor(error, before, most):  # type: ignore[no-untyped-def]
+    """How many times as long the next step may be, by the errors of the last two: Hairer and Wanner, II, IV.2."""
     if error == 0:
         return most
-    return min(most, max(0.2, 0.9 * error**-0.125)) if error < np.inf else 0.2
+    return min(most, max(0.2, 0.95 * error**-0.1 * before**0.05)) if error < np.inf else 0.2
 
 
 @inner
@@ -285,10 +300,10 @@ def _end_at_switch(looks, part, c, end, limits, atol, rtol, rate):  # type: igno
 
 @compiled(
     types.Tuple((types.int64, types.float64, types.int64, types.int64, types.boolean))(  # type: ignore[no-untyped-call]
-        _SYSTEM, _PLACES, MATRIX, VECTOR, VECTOR, VECTOR, types.float64, VECTOR, VECTOR, VECTOR, MATRIX
+        _SYSTEM, _PLACES, MATRIX, VECTOR, VECTOR, VECTOR, types.float64, VECTOR, VECTOR, VECTOR, VECTOR, MATRIX
     )
 )
-def advance(system, places, course, limits, x, atol, rtol, uneven, ends, lengths, states):  # type: ignore[no-untyped-def]
+def advance(system, places, course, limits, x, atol, rtol, uneven, sizes, ends, lengths, states):  # type: ignore[no-untyped-def]
     """Make steps until there is no room for more, the end is reached, a guard is met or one becomes too small.
 
     Each of them ends just past the first switch that it meets.
@@ -301,6 +316,7 @@ def advance(system, places, course, limits, x, atol, rtol, uneven, ends, lengths
             often in a row the motion has rested at any switch, and the part of the last step at which the guard is met.
         x: (n,) state at the start.
         atol, rtol, uneven: (n,) absolute tolerances, the relative one, and (n,) parts by which they move states.
+        sizes: (n,) of the rates, the largest so far; they are kept up.
         ends, lengths, states: (k,), (k,) and (k, n) take the ends of the steps and their lengths in s, and the states.
 
     Returns:
@@ -310,7 +326,7 @@ def advance(system, places, course, limits, x, atol, rtol, uneven, ends, lengths
     n, m, t, end, step, longest = x.size, places.size, limits[0], limits[1], limits[2], limits[3]
     slopes, shapes = np.empty((STAGES + 1 + FURTHER, n)), np.empty((SHAPES + 2, n))
     y, new = np.empty(n), np.empty(n)
-    count, tried, shrunk, attempts, whole, stop, guard, unclear = 0, 0, False, 0, 0.0, end, -1, False
+    count, tried, shrunk, before, attempts, whole, stop, guard, unclear = 0, 0, False, 1.0, 0, 0.0, end, -1, False
     _rates(system, t, x, slopes[0])
     if m:
         _values(system, t, x, course[0])
@@ -323,9 +339,9 @@ def advance(system, places, course, limits, x, atol, rtol, uneven, ends, lengths
         length = stop - t if last else min(step, longest)
         _all_stages(system, t, x, length, slopes, y, new)
         tried += 1
-        error = _error(slopes, x, new, length, atol, rtol)
-        step = length * _factor(error, 10.0 if error < 1 and not shrunk else 1.0)
-        shrunk = not error < 1
+        error = _error(system, t, x, new, length, slopes, y, sizes, atol, rtol)
+        step = length * _factor(error, before, 10.0 if error < 1 and not shrunk else 1.0)
+        shrunk, before = not error < 1, max(min(error, 1.0), 1e-4)
         if shrunk:
             continue
         reached = stop if last else t + length
