@@ -32,7 +32,7 @@ from shaftwork.sweep.ensemble_equations import (
     joined,
 )
 from shaftwork.sweep.lane_program import LaneProgram, lane_program
-from shaftwork.sweep.lane_tables import LaneCourse, Met
+from shaftwork.sweep.lane_tables import LaneCourse, LaneEnd, Met
 
 
 class Ensemble:
@@ -238,6 +238,13 @@ class _VariantCourse:
         group, p = group.some(on), p[:, on]
         course = self._course(equations, group, p, entry.some(on), (begin[on], ends[on], highs[on]))
         end = program.follow(course, equations.sizes, self.ensemble.rtol, self.ensemble.span)
+        return [*following, *self._after(equations, group, p, entry.some(on), end)]
+
+    def _after(
+        self, equations: EnsembleEquations, group: VariantGroup, p: Array, entry: PhaseEntry, end: LaneEnd
+    ) -> list[VariantGroup]:
+        """Take what a stretch tells into the measures; the groups that go on."""
+        program = equations.code.program
         for row, place in enumerate(program.integrated):
             self.values[place, group.lanes] += end.integrals[row]
         self.values[:, group.lanes] = np.where(self._extreme[:, None], end.best, self.values[:, group.lanes])
@@ -247,9 +254,9 @@ class _VariantCourse:
         self._switched[group.lanes[met >= program.guards]] += 1
         switched = (met >= program.guards) & (self._switched[group.lanes] < 200)  # more of them come to no end
         onward = (met == Met.THE_END) & ~over | switched  # in the same modes
-        ended = (met >= 0) & (met < program.guards)
-        left = PhaseEntry(np.where(ended, met, Met.NOTHING), entry.offsets[:, on])
-        return [*following, there.some(onward), *self._past_guards(equations, there, end.t, left)]
+        ended = np.where((met >= 0) & (met < program.guards), met, Met.NOTHING)
+        past = self._past_guards(equations, there, end.t, PhaseEntry(ended, entry.offsets))
+        return [there.some(onward), *past]
 
     def _past_guards(
         self, equations: EnsembleEquations, group: VariantGroup, after: Array, entry: PhaseEntry
