@@ -238,10 +238,10 @@ class _VariantCourse:
         group, p = group.some(on), p[:, on]
         course = self._course(equations, group, p, entry.some(on), (begin[on], ends[on], highs[on]))
         end = program.follow(course, equations.sizes, self.ensemble.rtol, self.ensemble.span)
-        return [*following, *self._after(equations, group, p, entry.some(on), end)]
+        return [*following, *self._after(equations, group, course, entry.some(on), end)]
 
     def _after(
-        self, equations: EnsembleEquations, group: VariantGroup, p: Array, entry: PhaseEntry, end: LaneEnd
+        self, equations: EnsembleEquations, group: VariantGroup, course: LaneCourse, entry: PhaseEntry, end: LaneEnd
     ) -> list[VariantGroup]:
         """Take what a stretch tells into the measures; the groups that go on."""
         program = equations.code.program
@@ -250,7 +250,7 @@ class _VariantCourse:
         self.values[:, group.lanes] = np.where(self._extreme[:, None], end.best, self.values[:, group.lanes])
         there, met = replace(group.going_on(group.modes, end.t, end.x), steps=end.steps), end.met
         over = (met == Met.THE_END) & (end.t >= self.ensemble.span[1])
-        self._end(equations, there, p, over)
+        self._end(equations, there, course, over)
         self._switched[group.lanes[met >= program.guards]] += 1
         switched = (met >= program.guards) & (self._switched[group.lanes] < 200)  # more of them come to no end
         onward = (met == Met.THE_END) & ~over | switched  # in the same modes
@@ -315,11 +315,12 @@ class _VariantCourse:
             groups.append(group.some(there).going_on(modes, t, x).some(same))
         return groups
 
-    def _end(self, equations: EnsembleEquations, group: VariantGroup, p: Array, over: Mask) -> None:
-        """The variants that have come to the end of their motion."""
+    def _end(self, equations: EnsembleEquations, group: VariantGroup, course: LaneCourse, over: Mask) -> None:
+        """The variants that have come to the end of their motion: just before it, where a law jumps there."""
         self.done[group.lanes[over]] = True
         if any(measure.kind == "end" for measure in self.ensemble.measures) and over.any():
-            shown = equations.code.program.points(group.t[over], group.x[:, over], p[:, over])["shown"]
+            before = np.minimum(group.t, course.highs)[over]
+            shown = equations.code.program.points(before, group.x[:, over], course.p[:, over])["shown"]
             for row, measure in enumerate(self.ensemble.measures):
                 if measure.kind == "end":
                     self.values[row, group.lanes[over]] = shown[row]

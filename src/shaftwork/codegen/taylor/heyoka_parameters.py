@@ -43,7 +43,7 @@ class Fixed:
         self._put_together: dict[Basic, tuple[Basic, ...]] = {}
         self.places: dict[Expr, int] = {part: place for place, part in enumerate(before)}
         """The place of each part among all of them."""
-        self._last: tuple[bytes, Array] | None = None
+        self._last: tuple[tuple[bytes, tuple[int, ...]], Array] | None = None
         self._find(expressions)
 
     def arguments(self, node: Basic) -> tuple[Basic, ...]:
@@ -54,7 +54,7 @@ class Fixed:
     def values(self, p: Array) -> Array:
         """(parts,) or (parts, k) from the parameters (p,) or (p, k); the last ones are kept."""
         used = p[self._used]
-        key = used.tobytes()
+        key = used.tobytes(), p.shape[1:]  # where nothing is used, the shape alone tells how many
         if self._last is None or self._last[0] != key:
             with np.errstate(all="ignore"):
                 parts = [np.broadcast_to(value, p.shape[1:]) for value in self._function(*used)]

@@ -79,6 +79,11 @@ class _Instant:
         stored = self.equations.code.program.points(t, x, self.p[:, there])["stored"]
         return _Instant(equations, columns, t, equations.taken_up(equations.parameters(columns), stored))
 
+    def follows(self, earlier: _Instant) -> Mask:
+        """(k,) whether no guard has been met since an earlier instant; a brake may stop what it holds at once."""
+        sides = self.equations.sides[:, None]
+        return np.asarray(~((sides * earlier.motion[1] < 0) & (sides * self.motion[1] > 0)).any(axis=0))
+
     def across(self, machine: int) -> Array:
         """(k,) the speed across a contact, of which the twist is a state, or across what slips."""
         place = self.equations.kirchhoff.twist(machine)
@@ -140,8 +145,8 @@ class LaneImpact:
             # a rebound that would lose less than it gains, as it is found late by rounding, is none
             last = (hit.loses[there] > 0) & (hit.loses[there] < 4 * hit.beyond[there] * self._pushed(flies))
             stays[there] = last
-            new = group.some(there).going_on(modes, flies.t, flies.moved(hit.late[there]).x)
-            groups.append(new.some(~last))
+            now = flies.moved(hit.late[there])
+            groups.append(group.some(there).going_on(modes, now.t, now.x).some(~last & now.follows(flies)))
         for modes, there in self._ends(hit.closed, stays):
             rests = hit.closed.taken_to(self.equations_of(modes), there)
             rests.x[rests.equations.kirchhoff.twist(self.active.machine)] = hit.limit[there]
