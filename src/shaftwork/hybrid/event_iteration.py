@@ -202,9 +202,12 @@ class EventIteration:
             idle = [] if latest else [*idle, worst]
             seen[state.regime.modes] = None
             state, worst = _worst(state, after, before, idle, repeats)
-            if worst is None and late:  # in the modes that go on, how long ago it was hit
-                state, worst = _worst(state.moved(after, late), after, before, idle, repeats)
-                late = 0.0
+            if (
+                worst is None and late
+            ):  # in the modes that go on, how long ago it was hit, if nothing stops it meanwhile
+                later, late = state.moved(after, late), 0.0
+                if not passes_limit(later, after):
+                    state, worst = _worst(later, after, before, idle, repeats)
         return state, transitions
 
     def _follow(

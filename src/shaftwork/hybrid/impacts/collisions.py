@@ -105,7 +105,8 @@ class Collisions:
         stages += self._compressed(t, begins, contacts)
         if back.any():
             stages += self._thrown_back(t, contacts, stages, back)
-        least = NO_IMPACT * max(1.0, np.abs(before).max(initial=0.0))
+        least = NO_IMPACT * max(1.0, fastest := np.abs(before).max(initial=0.0))
+        least = least if meets else max(least, fastest)  # what only touches closes, and moves apart by rounding alone
         pressed = zip(contacts, _pressed(stages), strict=True)
         hit = [c for c, impulse in pressed if c.leave and ((meets and impulse > 0) or is_wanted(c))]
         after, closed, further = self._closed_at_end(t, modes, contacts, stages, least, hit)

@@ -65,7 +65,7 @@ class Impacts:
         new, transitions = self._collided(t, after, state.moved(after, -late), crossed.machine, crossed.leave)
         if transitions[0].rebound and self._is_last(after, state, new, crossed):
             stays = replace(crossed.leave, rebound=None)
-            return *self._collided(t, after, state, crossed.machine, stays), 0.0
+            return *self._collided(t, after, state, crossed.machine, stays, holds=True), 0.0
         return new, transitions, late
 
     def _fastest(self, t: float, state: HybridState, crossed: ActiveGuard) -> ActiveGuard:
@@ -78,8 +78,13 @@ class Impacts:
         contact = thrown[0]
         return next(active for active in state.regime.watched if active.leave is contact.leave)
 
-    def _collided(self, t: float, after: float, state: HybridState, number: int, leave: Leave) -> EventOutcome:
-        """An impact of all contacts that touch: each is joined, or for an instant where it is thrown back."""
+    def _collided(
+        self, t: float, after: float, state: HybridState, number: int, leave: Leave, *, holds: bool = False
+    ) -> EventOutcome:
+        """An impact of all contacts that touch: each is joined, or for an instant where it is thrown back.
+
+        Where it is but rounding, what holds by friction holds on: else its whole torque would show for a nanosecond.
+        """
         regime = state.regime
         collision = self._collisions.impact(after, state, number, leave)
         new, hits = collision.after, list[Transition]()
@@ -92,6 +97,9 @@ class Impacts:
             if not rebound and contact.leave is not None:
                 new = self._at_limit(new, contact.number, contact.leave)
         new = self._staying(after, regime.modes, new)
+        holding = {k: regime.modes[k] for k, sides in limited(self._machines, regime.modes).items() if len(sides) > 1}
+        if holds and self._transfer.possible(held := with_modes(new.regime.modes, holding)):
+            new = self._transfer.to_modes(new, after, held)
         besides = {contact.number for contact in contacts}
         transitions = [*hits, *differences(t, self._machines, regime.modes, new.regime.modes, besides)]
         self._refuse_gain(after, state, new, hits[0])

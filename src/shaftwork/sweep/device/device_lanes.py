@@ -16,7 +16,7 @@ from shaftwork.core.errors import ParameterError, imported
 from shaftwork.formulation.explicit_rows import Rows
 from shaftwork.numerics.traced_code import rows_of
 from shaftwork.sweep.device.inner_search import DEPTH, INTERVAL
-from shaftwork.sweep.device.lock_step import LockStep, Mode, TracedStep
+from shaftwork.sweep.device.lock_step import LaneTask, LockStep, TracedStep
 from shaftwork.sweep.lane_program import LaneProgram, Seen, step_tolerance
 from shaftwork.sweep.lane_tables import LaneCourse, LaneEnd, LaneRow
 
@@ -140,7 +140,7 @@ class DeviceProgram(LaneProgram):
             memory[name][: len(rows), :count] = rows[:, variants]
         for name, value in (("begun", "time"), ("last_time", "time"), ("last_x", "x")):
             memory[name][:] = memory[value]
-        memory["goal"][:], memory["mode"][:count] = memory["time"][0], Mode.STARTS
+        memory["goal"][:], memory["mode"][:count] = memory["time"][0], LaneTask.STARTS
         return memory
 
     def _end(self, course: LaneCourse, reached: dict[str, Array]) -> LaneEnd:

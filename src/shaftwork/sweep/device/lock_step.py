@@ -25,7 +25,7 @@ SCRATCH = ("y", "new", "slopes", "fifth", "third", "fifths", "thirds", "moment")
 """What holds within a repetition alone."""
 
 
-class Mode(IntEnum):
+class LaneTask(IntEnum):
     """What a lane does in a repetition."""
 
     DONE = 0
@@ -114,20 +114,25 @@ class LockStep:
         kept = {name: rows for name, rows in self._sizes.items() if name not in SCRATCH}
         arrays = {name: np.zeros((rows, lanes), dtype=kind if name in states else float) for name, rows in kept.items()}
         arrays["lows"][:] = np.inf
-        mode = {"mode": np.full(lanes, Mode.DONE, dtype=np.int32), "met": np.full(lanes, Met.A_LIMIT, dtype=np.int32)}
+        mode = {
+            "mode": np.full(lanes, LaneTask.DONE, dtype=np.int32),
+            "met": np.full(lanes, Met.A_LIMIT, dtype=np.int32),
+        }
         times = {name: np.zeros(lanes) for name in ("goal", "far", "before", "behind", "crossed")}
         rise = {"guard": np.zeros(lanes, dtype=np.int32)}
         return {**arrays, **mode, **times, **rise, **self._search.begun(lanes)}
 
     def _course(self, memory: dict[str, Any]) -> dict[str, Any]:
-        going = self._jax.lax.while_loop(lambda now: self._numpy.any(now["mode"] != Mode.DONE), self._repeat, memory)
+        going = self._jax.lax.while_loop(
+            lambda now: self._numpy.any(now["mode"] != LaneTask.DONE), self._repeat, memory
+        )
         return {name: going[name] for name in ("time", "x", "best", "size", "met")}
 
     def _repeat(self, before: dict[str, Any]) -> dict[str, Any]:
         numpy, kind = self._numpy, before["x"].dtype
         memory = {name: numpy.zeros((self._sizes[name], before["met"].size), dtype=kind) for name in SCRATCH}
         memory |= {**before, "moment": before["time"]}
-        going, starting = (before["mode"] == mode for mode in (Mode.GOES, Mode.STARTS))
+        going, starting = (before["mode"] == mode for mode in (LaneTask.GOES, LaneTask.STARTS))
         memory["active"] = going[None].astype(float)
         self._writer.advance(TracedBody(self._jax, memory), self._writer.probe)
         for name in ("step", "made", "size"):
@@ -148,7 +153,7 @@ class LockStep:
         sizes = numpy.where(rates > 0, 0.01 * (memory["nominal"] + x) / numpy.where(rates > 0, rates, 1.0), np.inf)
         first = numpy.maximum(numpy.min(sizes, axis=0), memory["step"])
         memory["step"] = numpy.where(starting, first, memory["step"])
-        memory["mode"] = numpy.where(starting, Mode.GOES, memory["mode"])
+        memory["mode"] = numpy.where(starting, LaneTask.GOES, memory["mode"])
         first, free = JET * (self._sizes["best"] + self._guards), self._free
         jets = memory["seen"][first : first + JET * free].reshape(free, JET, starting.size)
         told = numpy.take_along_axis(jets, numpy.argmax(jets != 0, axis=1)[:, None], 1)[:, 0]
@@ -162,24 +167,24 @@ class LockStep:
         over = memory["time"][0] >= memory["end"][0]
         arrived = moved & ~close & over | settled & (over | (memory["met"] >= 0))
         self._set(memory, arrived & (memory["met"] < 0), met=int(Met.THE_END))
-        self._set(memory, arrived | self._hopeless(memory), mode=int(Mode.DONE))
+        self._set(memory, arrived | self._hopeless(memory), mode=int(LaneTask.DONE))
 
     def _look(self, memory: dict[str, Any], close: Any) -> Any:
         """Look into last steps; which lanes have nothing more to be looked at."""
         numpy, search, mode, guarded = self._numpy, self._search, memory["mode"], self._sizes["sides"] > 0
-        looking, peaks = (mode == Mode.GUARDS) | (mode == Mode.PEAKS), mode == Mode.PEAKS
+        looking, peaks = (mode == LaneTask.GUARDS) | (mode == LaneTask.PEAKS), mode == LaneTask.PEAKS
         search.divide(memory, looking)
         ready = more = numpy.zeros_like(close)
         if guarded:
-            ready = (mode == Mode.CLEARS) | self._land(memory)  # before others are told to land
+            ready = (mode == LaneTask.CLEARS) | self._land(memory)  # before others are told to land
             more = self._rise(memory)
         ready = search.open(memory, close, ready)
         found, peaks = search.next(memory, looking | close | ready), peaks | ready
         if guarded:
-            guards = (mode == Mode.GUARDS) | close & ~peaks
-            self._set(memory, guards, mode=numpy.where(found, Mode.GUARDS, Mode.CLEARS))
+            guards = (mode == LaneTask.GUARDS) | close & ~peaks
+            self._set(memory, guards, mode=numpy.where(found, LaneTask.GUARDS, LaneTask.CLEARS))
             self._approach(memory, more | guards & ~found & self._exceeded(memory))
-        self._set(memory, peaks, mode=numpy.where(found, Mode.PEAKS, Mode.GOES))
+        self._set(memory, peaks, mode=numpy.where(found, LaneTask.PEAKS, LaneTask.GOES))
         return peaks & ~found
 
     def _set(self, memory: dict[str, Any], on: Any, **values: Any) -> None:
@@ -192,7 +197,7 @@ class LockStep:
         time, step, count = memory["time"][0], memory["step"][0], memory["made"][0]
         gone = time - memory["begun"][0]
         slow = (count > 4 * LANES) & (count * (gone + memory["far"] - time) > 100_000 * gone)
-        return (memory["mode"] == Mode.GOES) & (slow | (count > 0) & ~(step > 8 * EPS * abs(time)))
+        return (memory["mode"] == LaneTask.GOES) & (slow | (count > 0) & ~(step > 8 * EPS * abs(time)))
 
     def _exceeded(self, memory: dict[str, Any]) -> Any:
         """Whether there are guards of which the time has to be found."""
@@ -207,11 +212,11 @@ class LockStep:
         share = numpy.where(on, (upper - low) / (high - low), 1.0)
         part = self._search.root(quintic(high - low, *jets), numpy.zeros_like(low), share, 1.0, 8)
         guess = low + (high - low) * part[0]
-        self._set(memory, on, mode=int(Mode.RISES), guard=guard, before=low, behind=upper, goal=guess, looks=0)
+        self._set(memory, on, mode=int(LaneTask.RISES), guard=guard, before=low, behind=upper, goal=guess, looks=0)
 
     def _rise(self, memory: dict[str, Any]) -> Any:
         """A step of Newton's to the time at which a guard rises through zero; which lanes have more of them."""
-        numpy, on, there = self._numpy, memory["mode"] == Mode.RISES, memory["goal"]
+        numpy, on, there = self._numpy, memory["mode"] == LaneTask.RISES, memory["goal"]
         value, rate, _ = self._search.jet(memory, "seen", self._sizes["best"] + memory["guard"])
         before, behind = (
             numpy.where(value > 0, memory["before"], there),
@@ -228,7 +233,7 @@ class LockStep:
         numbers = np.arange(self._sizes["sides"])[:, None]
         memory["uppers"] = numpy.where(on & near & (numbers == memory["guard"]), np.inf, memory["uppers"])
         more = on & near & self._exceeded(memory)
-        self._set(memory, on & near & ~more, mode=int(Mode.LANDS), goal=memory["crossed"])
+        self._set(memory, on & near & ~more, mode=int(LaneTask.LANDS), goal=memory["crossed"])
         return more
 
     def _land(self, memory: dict[str, Any]) -> Any:
@@ -238,7 +243,7 @@ class LockStep:
         """
         numpy, mode, rounding = self._numpy, memory["mode"], self._numpy.finfo(memory["x"].dtype).eps
         passing = (memory["met"] >= self._guards) | (rounding > EPS)
-        landed = (mode == Mode.LANDS) & ~passing | (mode == Mode.PASSES)
+        landed = (mode == LaneTask.LANDS) & ~passing | (mode == LaneTask.PASSES)
         self._set(memory, landed, time=memory["goal"], x=memory["new"], sight=memory["seen"])
         states = slice(0, self._sizes["nominal"])
         change = abs(memory["new"][states] - memory["last_x"][states])
@@ -247,5 +252,5 @@ class LockStep:
         near = part * (memory["nominal"] + abs(memory["new"][states]))
         longest = numpy.min(numpy.where(rate > 0, near / numpy.where(rate > 0, rate, 1.0), np.inf), axis=0)
         past = numpy.minimum(memory["end"][0], memory["goal"] + longest)
-        self._set(memory, (mode == Mode.LANDS) & passing, mode=int(Mode.PASSES), goal=past)
+        self._set(memory, (mode == LaneTask.LANDS) & passing, mode=int(LaneTask.PASSES), goal=past)
         return landed

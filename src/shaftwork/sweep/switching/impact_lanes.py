@@ -139,15 +139,16 @@ class LaneImpact:
             CompileError: they cannot be followed side by side.
         """
         hit = self._hit(_Instant(self.equations, columns, group.t, group.x))
-        groups, stays = list[VariantGroup](), hit.sure & ~hit.thrown
+        groups, last = list[VariantGroup](), np.zeros(group.lanes.size, dtype=bool)
         for modes, there in self._ends(hit.back, hit.sure & hit.thrown):
             flies = hit.back.taken_to(self.equations_of(modes), there)
             # a rebound that would lose less than it gains, as it is found late by rounding, is none
-            last = (hit.loses[there] > 0) & (hit.loses[there] < 4 * hit.beyond[there] * self._pushed(flies))
-            stays[there] = last
+            last[there] = (hit.loses[there] > 0) & (hit.loses[there] < 4 * hit.beyond[there] * self._pushed(flies))
             now = flies.moved(hit.late[there])
-            groups.append(group.some(there).going_on(modes, now.t, now.x).some(~last & now.follows(flies)))
-        for modes, there in self._ends(hit.closed, stays):
+            new = group.some(there).going_on(modes, now.t, now.x)
+            groups.append(new.some(~last[there] & now.follows(flies)))
+        rigid = with_modes(self.equations.modes, {self.active.machine: self.active.leave.to})
+        for modes, there in (*self._ends(hit.closed, hit.sure & ~hit.thrown), (rigid, last)):
             rests = hit.closed.taken_to(self.equations_of(modes), there)
             rests.x[rests.equations.kirchhoff.twist(self.active.machine)] = hit.limit[there]
             groups.append(group.some(there).going_on(modes, rests.t, rests.x))
