@@ -183,7 +183,7 @@ def measured(
             _workers.clear()
             _workers[head] = _begun(head, expected, why)
         worker, done, end = _workers[head], [], time.monotonic() + 1.0
-        for part in parted(np.arange(variants.size), worker.chunk):
+        for part in worker.parts(np.arange(variants.size)):
             done.append(worker.run(variants[part], {name: column[part] for name, column in rows.items()}))
             if time.monotonic() > end:
                 break

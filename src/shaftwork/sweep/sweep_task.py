@@ -48,9 +48,9 @@ if TYPE_CHECKING:
     from shaftwork.sweep.device.device_lanes import Device
     from shaftwork.sweep.ensemble import Ensemble
 
-SIDE_BY_SIDE, CHUNK, DEVICE_CHUNK, LONE_CHUNK = 16, 2048, 65536, 8
+SIDE_BY_SIDE, FIRST_CHUNK, CHUNK, DEVICE_CHUNK, LONE_CHUNK = 16, 128, 2048, 65536, 8
 """Variants: from which on it is worth while to compile a program for many of them; and that are computed and stored at
-once, side by side, on a graphics processor and one by one."""
+once: side by side at first and at most, on a graphics processor, and one by one."""
 
 
 Index = NDArray[np.intp]
@@ -134,6 +134,10 @@ class Worker:
         """Why variants run one by one."""
         self._ensemble = self._side_by_side()
         self.chunk = LONE_CHUNK if self._ensemble is None else DEVICE_CHUNK if device else CHUNK
+
+    def parts(self, variants: Index) -> Iterator[Index]:
+        """Variants in chunks, of which each that is done is stored."""
+        return paced(variants, self.chunk) if self._device is None else iter(parted(variants, self.chunk))
 
     def _refuse_unknown(self) -> None:
         observer = ModelObserver(self._model.form, self._model.bind)
@@ -286,19 +290,30 @@ def chunks(worker: Worker, task: Task, variants: Index, processes: int | None) -
     """
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         sys.exit(1)  # a script without a guard, run again by a process that it has started: the first one says so
-    parts = parted(variants, worker.chunk)
     count = processes if processes is not None else cores() if _can_be_sent(task) else 1
     if processes is not None and count > 1 and worker.why:
-        yield from _in_processes(task, parts, count)
+        yield from _in_processes(task, parted(variants, worker.chunk), count)
         return
-    for number, part in enumerate(parts):
+    done = 0
+    for part in worker.parts(variants):
         began = time.monotonic()
         yield worker.run(part)
-        left = len(parts) - number - 1
+        first, done = not done, done + part.size
+        left = (time.monotonic() - began) / part.size * (variants.size - done)
         # Processes pay where more than 8 s are left: each needs seconds to import and to compile.
-        if number and count > 1 and (time.monotonic() - began) * left > 8.0:  # the first one compiles
-            yield from _in_processes(task, parts[number + 1 :], count)
+        if not first and count > 1 and left > 8.0:  # the first one compiles
+            yield from _in_processes(task, parted(variants[done:], part.size), count)
             return
+
+
+def paced(variants: Index, most: int) -> Iterator[Index]:
+    """Variants in chunks that are few at first, and twice as many as long as one is done within a second."""
+    size, done = min(most, FIRST_CHUNK), 0
+    while done < variants.size:
+        began = time.monotonic()
+        yield variants[done : done + size]
+        done += size
+        size = min(2 * size, most) if time.monotonic() - began < 1.0 else size
 
 
 def parted(variants: Index, size: int) -> list[Index]:
