@@ -150,7 +150,7 @@ def test_what_a_device_cannot_do_runs_one_by_one() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"on": "tpu"}, "'tpu' must be 'gpu'"),
+        ({"on": "tpu"}, "'tpu' must be a client of Dask"),
         ({"precision": "single"}, "on='gpu'"),
         ({"on": CPU, "precision": "half"}, "'half'"),
         pytest.param(

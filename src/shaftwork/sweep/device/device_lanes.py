@@ -46,11 +46,11 @@ class Device:
             ParameterError: there is none.
             MissingExtraError: JAX is not installed.
         """
+        if isinstance(on, str) and on != "gpu":
+            raise ParameterError(f"on = '{on}' must be a client of Dask, distributed.Client('{on}'), or 'gpu'.")
         jax = imported("jax", "gpu", "sweep(on='gpu')")
         if not isinstance(on, str):
             return cls(on, precision)
-        if on != "gpu":
-            raise ParameterError(f"on = '{on}' must be 'gpu', a device of JAX or a client of Dask.")
         try:
             return cls(jax.devices("gpu")[0], precision)
         except RuntimeError:
