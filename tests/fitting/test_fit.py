@@ -196,6 +196,82 @@ def test_a_start_at_which_the_rest_of_the_record_is_out_of_step_is_led_by_its_be
     assert fit.estimate.evaluations < 8  # some thirteen over the whole record alone
 
 
+def gap_and_friction() -> tuple[sw.Network, dict[str, object]]:
+    """A train and a record of it."""
+    net, rng = sw.Network("gap and friction"), np.random.default_rng(0)
+    net.add(sw.TorqueSource("motor", tau=30.0 * sympy.sin(3.0 * sw.t)), "rotor")
+    net.add(sw.Inertia("J1", J=2.0), "rotor")
+    net.add(sw.Backlash("shaft", c=800.0, d=3.0, gap=0.03), "rotor", "wheel")
+    net.add(sw.Inertia("J2", J=1.5), "wheel")
+    net.add(sw.CoulombLoad("load", tau=6.0), "wheel")
+    t = np.linspace(0.0, 3.0, 151)
+    sol = net.simulate(3.0, t_eval=t)
+    noisy = {
+        name: sol[name] + rng.normal(0.0, 0.02 * np.abs(sol[name]).max(), t.size) for name in ("shaft.tau", "J2.omega")
+    }
+    return net, {"t": t, **noisy}
+
+
+FAR = {"shaft.gap": 0.09, "load.tau": 12.0, "shaft.c": 1600.0}
+
+
+@pytest.mark.slow
+def test_one_of_several_starts_finds_the_truth_that_a_start_far_off_misses() -> None:
+    net, measured = gap_and_friction()
+    with pytest.warns(sw.AccuracyWarning, match=r"does not follow the record of shaft\.tau"):
+        alone = sw.fit(net, measured, list(FAR), start=FAR)
+    best = sw.fit(net, measured, list(FAR), start=FAR, starts=8)
+    true = net.compile().parameters
+    for name, (low, high) in best.intervals(0.999).items():
+        assert low < true[name] < high
+        assert not alone.intervals(0.999)[name][0] < true[name] < alone.intervals(0.999)[name][1]
+    assert alone.caveat in str(alone)
+    assert not best.caveat
+    assert best.estimate.misfit < min(other.misfit for other in best.others)
+    assert "Of 8 starts 3 were followed to the end" in str(best)  # the first and a quarter of seven
+    assert "In the next one chi^2 is larger by" in str(best)
+
+
+def test_starts_that_end_alike_are_counted_and_the_same_seed_gives_the_same() -> None:
+    net, measured = gap_and_friction()
+    unknowns = {"shaft.gap": (0.01, 0.1), "load.tau": (2.0, 12.0), "shaft.c": (300.0, 3000.0)}
+    first, again = (sw.fit(net, measured, unknowns, starts=3, seed=2) for _ in range(2))
+    assert str(first) == str(again)
+    assert "Of 3 starts 2 were followed to the end, 2 to this minimum." in str(first)
+
+
+def test_chi_squared_of_deviations_that_are_given_is_the_sum_of_squares() -> None:
+    net, measured = gap_and_friction()
+    sigma = {"shaft.tau": 0.45, "J2.omega": 0.09}
+    two = [sw.fit(net, measured, ["shaft.c"], sigma=sigma, parameters={"load.tau": tau}) for tau in (6.0, 6.05)]
+    sums = [sum(((fit.residuals[name] / sigma[name]) ** 2).sum() for name in sigma) for fit in two]
+    # residuals are those of the last step by derivatives, to some 1e-8
+    assert two[1].estimate.misfit - two[0].estimate.misfit == pytest.approx(sums[1] - sums[0], rel=1e-6)
+
+
+def test_a_model_without_what_the_record_shows_is_told_from_a_right_one() -> None:
+    _, measured = gap_and_friction()
+    stiff = sw.Network("no gap")
+    stiff.add(sw.TorqueSource("motor", tau=30.0 * sympy.sin(3.0 * sw.t)), "rotor")
+    stiff.add(sw.Inertia("J1", J=2.0), "rotor")
+    stiff.add(sw.Spring("shaft", c=800.0, d=3.0), "rotor", "wheel")
+    stiff.add(sw.Inertia("J2", J=1.5), "wheel")
+    stiff.add(sw.Damper("load", d=1.0), "wheel")
+    with pytest.warns(sw.AccuracyWarning, match="intervals do not hold"):
+        fit = sw.fit(stiff, measured, ["shaft.c", "load.d"])
+    assert "J2.omega" in fit.caveat
+    assert fit.correlation["J2.omega"] > 0.5
+
+
+def test_a_profile_is_named_with_the_places_that_can_be_recorded() -> None:
+    net = sw.Network("line")
+    net.add(sw.TorqueSource("motor", tau=10.0), "a")
+    net.add(sw.Shaft("shaft", length=1.0, diameter=0.03, damping=1.0, model=sw.Lumped(m=3)), "a", "b")
+    net.add(sw.Inertia("J", J=1.0), "b")
+    with pytest.raises(sw.ParameterError, match=r"'shaft\.tau' has values at many.*shaft\.tau_a or shaft\.tau_b"):
+        sw.fit(net, {"t": [0.1, 0.2], "shaft.tau": [1.0, 2.0]}, ["J.J"])
+
+
 def test_a_frequency_response_tells_stiffness_and_damping() -> None:
     net, rng = sw.scenes.crane_start(), np.random.default_rng(4)
     point, f = {"J1.omega": 8.0, "J2.omega": 8.0}, np.linspace(1.0, 15.0, 60)
@@ -274,6 +350,8 @@ def test_a_controller_that_samples_is_fitted_by_differences() -> None:
         ({"parameters": {"shaft.c": 2e4}}, "is unknown and has a value"),
         ({"start": {"shaft.c": "x"}}, "shaft"),
         ({"loss": "absolute"}, "no loss 'absolute'"),
+        ({"starts": 0}, "starts = 0 must be a whole number"),
+        ({"seed": -1}, "seed = -1 0 or more"),
         ({"record": {"f": [1.0, 2.0], "shaft.tau": [1.0, 2.0]}}, "is no response"),
         ({"record": {"t": [1.0], "shaft.tau": [1.0]}, "unknowns": ["shaft.c", "shaft.d"]}, "1 values for 2 unknowns"),
     ],

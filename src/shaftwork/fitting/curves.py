@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.calls import BoundedCache
-from shaftwork.core.errors import CompileError, ShaftworkError, SimulationError
+from shaftwork.core.errors import CompileError, ParameterError, ShaftworkError, SimulationError
 from shaftwork.numerics.differences import differences
 from shaftwork.pipeline.model import Model
+from shaftwork.results.solution import Solution
 from shaftwork.sensitivities.legs import DifferentiatedMotion
 from shaftwork.sensitivities.parametric_motion import ParametricMotion
 
@@ -157,7 +158,7 @@ class RecordedMotion:
     def values(self, parameters: Mapping[str, float]) -> Array:
         """(N,) computed."""
         solution = self._followed(parameters).solution
-        return np.concatenate([solution.at(times)[name] for name, times in self._samples.items()])
+        return _in_turn(solution, self._samples)
 
     def slopes(self, parameters: Mapping[str, float]) -> Array:
         """(N, m) derivatives by the parameters."""
@@ -199,7 +200,7 @@ class SimulatedMotion:
         motion = self._model.simulate(
             self._end, initial={**self._initial, **starts}, parameters=values, rtol=self._rtol, t_eval="steps"
         )
-        return np.concatenate([motion.at(times)[name] for name, times in self._samples.items()])
+        return _in_turn(motion, self._samples)
 
     def slopes(self, parameters: Mapping[str, float]) -> None:  # noqa: ARG002 (by differences)
         """None: by differences."""
@@ -230,6 +231,22 @@ class RecordedResponse:
     def slopes(self, parameters: Mapping[str, float]) -> None:  # noqa: ARG002 (by differences)
         """None: by differences."""
         return
+
+
+def _in_turn(motion: Solution, samples: Mapping[str, Array]) -> Array:
+    """(N,) quantities at their times, one after the other.
+
+    Raises:
+        ParameterError: one is a profile.
+    """
+    for name in samples:
+        if name in motion.observer.profiles:
+            ends = [other for other in motion.observer.units if other.startswith(f"{name}_")]
+            raise ParameterError(
+                f"'{name}' has values at many places along its part, and the record one. Name it as the record of one "
+                f"place: {' or '.join(ends)}."
+            )
+    return np.concatenate([motion.at(times)[name] for name, times in samples.items()])
 
 
 def last_of(samples: Mapping[str, Array]) -> float:

@@ -85,6 +85,7 @@ class Estimate:
         at_bounds: (m,) which unknowns ended at a bound.
         evaluations: motions computed over the whole record.
         message: why it is no minimum yet; empty where it is one.
+        misfit: minus twice the logarithm of the likelihood, but for a constant; a difference counts like one of chi^2.
     """
 
     unknowns: Array
@@ -96,6 +97,12 @@ class Estimate:
     at_bounds: NDArray[np.bool_]
     evaluations: int
     message: str
+    misfit: float
+
+    def alike(self, other: Estimate) -> bool:
+        """Whether another is in the same minimum: no unknown differs by more than its standard deviation here."""
+        reach = np.fmax(np.sqrt(np.diag(self.covariance)), EQUAL)
+        return bool((np.abs(self.unknowns - other.unknowns) <= reach).all())
 
 
 def estimate(
@@ -104,6 +111,7 @@ def estimate(
     start: Array,
     bounds: tuple[Array, Array],
     beginning: tuple[Curves, NDArray[np.bool_]] | None = None,
+    effort: tuple[int, int] = (30, 200),
 ) -> Estimate:
     """Fit the unknowns, and the deviations of the noise in turn with them where these are not given.
 
@@ -113,20 +121,28 @@ def estimate(
         start: (m,) unknowns to start from.
         bounds: (m,) and (m,) of the unknowns.
         beginning: a part of the curves that is fitted first, and (N,) which values it holds.
+        effort: at most so many rounds, and motions in each; deviations and unknowns settle in some five rounds.
 
     Raises:
         ParameterError: there are fewer values than unknowns.
         SimulationError: the motion at the start cannot be computed.
     """
     unknowns, weights = _begun(curves, data, start, bounds, beginning)
-    result, weights, evaluations, message = _settled(curves, data, unknowns, weights, bounds)
+    result, weights, evaluations, message = _settled(curves, data, unknowns, weights, bounds, effort)
     unknowns, residuals = result.x, curves.values(result.x) - data.measured
     at_bounds, slopes = result.active_mask != 0, curves.slopes(unknowns)
     covariance, directions, spreads = _spread(slopes, residuals, data, weights, at_bounds)
     if data.loss == "linear" and np.isfinite(covariance).all():
         step = _last_step(slopes, residuals, data, weights, covariance, unknowns)
         unknowns, residuals = np.clip(unknowns + step, *bounds), residuals + slopes @ step
-    return Estimate(unknowns, covariance, weights, residuals, directions, spreads, at_bounds, evaluations, message)
+    fit = _misfit(residuals, data, weights, unknowns)
+    return Estimate(unknowns, covariance, weights, residuals, directions, spreads, at_bounds, evaluations, message, fit)
+
+
+def _misfit(residuals: Array, data: Data, deviations: Array, unknowns: Array) -> float:
+    rho, _, _ = LOSSES[data.loss]((residuals / deviations[data.series]) ** 2)
+    beside = np.nansum(((unknowns - data.priors) / data.prior_deviations) ** 2)
+    return float(rho.sum() + 2 * data.counts @ np.log(deviations) + beside)
 
 
 def _begun(
@@ -152,17 +168,18 @@ def _begun(
 
 
 def _settled(
-    curves: Curves, data: Data, unknowns: Array, weights: Array, bounds: tuple[Array, Array]
+    curves: Curves, data: Data, unknowns: Array, weights: Array, bounds: tuple[Array, Array], effort: tuple[int, int]
 ) -> tuple[Any, Array, int, str]:
     """Scipy's last result, deviations (series,), motions computed, and why it is no minimum, if it is none."""
     alone = weights.size == 1 and data.loss == "linear" and np.isnan(data.priors).all()
     settled, evaluations, message = data.deviations is not None or alone, 0, ""
     # A ten-thousandth of its deviation is the last step, which derivatives tell to more than that.
     last_gain = 1e-8 / data.measured.size
-    rounds = 30  # deviations and unknowns settle in some five
+    rounds, motions = effort
     for _ in range(rounds):
         # While the deviations change, the minimum moves with them.
-        last, result = settled, _fitted(curves, data, weights, unknowns, bounds, last_gain if settled else 1e-5)
+        gain = last_gain if settled else 1e-5
+        last, result = settled, _fitted(curves, data, weights, unknowns, bounds, gain, motions)
         evaluations += int(result.nfev)
         message = "" if result.status > 0 else str(result.message).rstrip(".")
         unknowns = result.x
@@ -220,11 +237,17 @@ def _noise(residuals: Array, data: Data, unknowns: int) -> Array:
 
 
 def _fitted(
-    curves: Curves, data: Data, deviations: Array, start: Array, bounds: tuple[Array, Array], gain: float
+    curves: Curves,
+    data: Data,
+    deviations: Array,
+    start: Array,
+    bounds: tuple[Array, Array],
+    gain: float,
+    motions: int = 200,
 ) -> Any:
     """Scipy's result; its cost counts priors without a loss.
 
-    It ends where one more step would lower the cost by less than a part `gain`.
+    It ends where one more step would lower the cost by less than a part `gain`, or after so many motions.
     """
     scale, expected = 1 / deviations[data.series], ~np.isnan(data.priors)
     apart = np.eye(start.size)[expected] / data.prior_deviations[expected, None]
@@ -258,7 +281,7 @@ def _fitted(
         xtol=EQUAL,
         ftol=max(gain, TYPED),
         gtol=EPS,
-        max_nfev=200,
+        max_nfev=motions,
     )
 
 

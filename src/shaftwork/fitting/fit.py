@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.calls import BoundedCache
-from shaftwork.core.errors import ParameterError
-from shaftwork.core.parameters import Parameter, in_si
+from shaftwork.core.errors import AccuracyWarning, ParameterError
+from shaftwork.core.notices import warn
+from shaftwork.core.parameters import Parameter, in_si, whole
 from shaftwork.fitting.curves import (
     RecordedMotion,
     RecordedResponse,
@@ -23,9 +24,10 @@ from shaftwork.fitting.curves import (
     recorded_motion,
     sizes_of,
 )
-from shaftwork.fitting.estimation import LOSSES, Data, estimate
+from shaftwork.fitting.estimation import LOSSES, Data
 from shaftwork.fitting.fit_result import AT_START, Fit
 from shaftwork.fitting.fitted_records import RecordedSeries, read_records
+from shaftwork.fitting.several_starts import estimates, starts_from
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.arguments import checked_parameter, checked_parameters, range_of, relative_tolerance, repeated
 from shaftwork.pipeline.model import Model
@@ -53,6 +55,8 @@ def fit(
     parameters: OfEach = None,
     at: OfEach = None,
     rtol: float = 1e-6,
+    starts: int = 1,
+    seed: int = 0,
 ) -> Fit:
     """Find parameters of a network from a record of its motion, or of its frequency response.
 
@@ -63,7 +67,8 @@ def fit(
 
     The intervals hold for a model that is right, and for noise that is white: then the `correlation` of neighbouring
     residuals is near zero. Where it is not, something is missing in the model, or samples are closer than the noise
-    changes; then true intervals are wider.
+    changes; then true intervals are wider. A fit goes downhill from its start: further `starts` show whether another
+    minimum is deeper, and several that end alike are a sign, not a proof, that there is none.
 
     Args:
         net: the network.
@@ -80,12 +85,21 @@ def fit(
         parameters: values of other parameters where they differ from the network's, likewise one or a list.
         at: for a frequency response, the point, as for `Model.linearize`, likewise.
         rtol: relative tolerance of the derivatives; motions are computed a hundred times closer.
+        starts: how many. Further ones fill the ranges evenly, a parameter above zero by its logarithm; an unknown
+            without two finite bounds starts within a factor of two of its first start, or its size beside it. Each is
+            followed for twenty motions, and the best quarter is fitted to the end, as the first start is.
+        seed: of the further starts.
 
     Raises:
         ParameterError: there is no such parameter, or an argument is out of its range.
         SignalError: there is no such quantity.
         SimulationError: the motion at the start cannot be computed.
+
+    Warns:
+        AccuracyWarning: what is left is plainly no noise, so that the intervals do not hold.
     """
+    if whole(starts) is None or whole(seed, 0) is None:
+        raise ParameterError(f"starts = {starts!r} must be a whole number, 1 or more, and seed = {seed!r} 0 or more.")
     domain, records = read_records(record)
     initials, others, points = (
         _of_each(name, given, len(records))
@@ -109,9 +123,13 @@ def fit(
     curves = ScaledCurves(sources, fitted.scaling)
     data = _data(tuple(series.values()), sigma, *_priors(priors, fitted.scaling), loss)
     bounds, beginning = (fitted.low, fitted.high), _beginning(sources, fitted.scaling)
-    estimated = estimate(curves, data, fitted.start, bounds, beginning)
+    best, *others = estimates(curves, data, starts_from(fitted.start, bounds, starts, seed), bounds, beginning)
     samples = {name: one.at for name, one in series.items()}
-    return Fit(net, fitted.units, fitted.scaling, samples, data, estimated, domain, usual, curves.by_differences)
+    differences, ends = curves.by_differences, tuple(others)
+    result = Fit(net, fitted.units, fitted.scaling, samples, data, best, domain, usual, differences, ends, starts)
+    if result.caveat:
+        warn(result.caveat, AccuracyWarning)
+    return result
 
 
 class _Unknowns(NamedTuple):

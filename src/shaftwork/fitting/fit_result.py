@@ -15,6 +15,7 @@ from shaftwork.core.notebook import html_table
 from shaftwork.core.screen import counted, in_columns
 from shaftwork.fitting.curves import Scaling
 from shaftwork.fitting.estimation import Data, Estimate
+from shaftwork.numerics.tolerances import EQUAL
 from shaftwork.pipeline.network import Network, with_values
 from shaftwork.results.plotting import new_figure, plain
 
@@ -40,6 +41,8 @@ class Fit:
         domain: "t" or "f".
         initial: start values of states; of several records those of the first.
         by_differences: whether some derivatives had to be had by differences.
+        others: where further starts ended that were followed to the end, best first.
+        tried: how many starts there were.
     """
 
     network: Network
@@ -51,6 +54,8 @@ class Fit:
     domain: str
     initial: Mapping[str, float]
     by_differences: bool
+    others: tuple[Estimate, ...] = ()
+    tried: int = 1
 
     @cached_property
     def values(self) -> dict[str, float]:
@@ -124,6 +129,26 @@ class Fit:
             if spread > 1.0
         )
 
+    @property
+    def caveat(self) -> str:
+        """Why the intervals do not hold; empty where what is left may be noise.
+
+        Law: the correlation of neighbouring residuals is above 0.5 and three standard deviations of that of white
+        noise, and what is left is above a millionth of the largest value, which may be errors of computation.
+        """
+        apart = [
+            name
+            for name, values in self.measured.items()
+            if self.correlation[name] > max(0.5, 3 / len(values) ** 0.5)
+            and self.noise[name] > EQUAL * np.abs(values).max()
+        ]
+        if not apart:
+            return ""
+        return (
+            f"The model does not follow the record of {', '.join(apart)}: neighbouring residuals are alike, so what is "
+            "left is no noise, and the intervals do not hold. Take other starts, starts=8, or add what the model lacks."
+        )
+
     @cached_property
     def residuals(self) -> dict[str, Array]:
         """(k,) by quantity, computed less measured; of a response complex."""
@@ -189,6 +214,8 @@ class Fit:
             words = ", ".join(f"{name} {share:+.2f}" for name, share in shares.items())
             extent = "not at all" if np.isinf(spread) else f"to {100 * spread:.0f} % only"
             notes.append(f"The record tells this combination {extent}: {words}.")
+        notes += [self._told_of_starts()] if self.tried > 1 else []
+        notes += [self.caveat] if self.caveat else []
         if self.estimate.message:
             notes.append(f"This is no minimum yet: {self.estimate.message}.")
         if self.by_differences:
@@ -197,6 +224,16 @@ class Fit:
         if ended:
             notes.append(f"At a bound, and without an interval: {', '.join(ended)}.")
         return title, ["", "fitted", "95 % from", "to", "start", "unit"], rows, notes
+
+    def _told_of_starts(self) -> str:
+        other = [end for end in self.others if not self.estimate.alike(end)]
+        told = f"Of {self.tried} starts {1 + len(self.others)} were followed to the end, "
+        told += f"{1 + len(self.others) - len(other)} to this minimum."
+        if not other:
+            return told
+        values = zip(self.scaling.names, self.scaling.values(other[0].unknowns).tolist(), strict=True)
+        words = ", ".join(f"{name} = {value:.6g}" for name, value in values)
+        return f"{told} In the next one chi^2 is larger by {other[0].misfit - self.estimate.misfit:.3g}: {words}."
 
     def __str__(self) -> str:
         title, header, rows, notes = self._rows()

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
-from scipy.stats import qmc
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import whole
 from shaftwork.core.screen import progress
+from shaftwork.numerics.even_points import even_points
 from shaftwork.numerics.tolerances import TYPED
 from shaftwork.optimization.measured_motion import Goal, MeasuredMotion
 from shaftwork.optimization.optimum import Attempt, Optimum
@@ -129,8 +129,7 @@ def _starts(net: Network, ranges: Mapping[str, tuple[float, float]], count: int,
     low, high = np.array(list(ranges.values())).T
     parameters = net.compile().parameters
     first = np.clip([parameters[name] for name in ranges], low, high)
-    further = qmc.Sobol(len(ranges), seed=seed).random_base2(max(count - 1, 1).bit_length())[: count - 1]
-    return [first, *(low + further * (high - low))]
+    return [first, *even_points(low, high, count - 1, seed)]
 
 
 def _attempt(
