@@ -118,12 +118,41 @@ def test_where_no_design_meets_the_limits_the_error_says_how_near_they_came() ->
         ({"require": {"end JL.omega": ("a", None)}}, r"is a text"),
         ({"functions": {"size": len}}, "a function without limits"),
         ({"choices": {"motor": []}}, "nothing to choose"),
+        ({"choices": {"motor": [3.0]}}, r"choices\['motor'\] holds 3\.0"),
+        ({"choices": {"box": [{"gear.ratio": 3.0}]}}, r"'gear\.ratio' is in variables and in choices\['box'\]"),
+        ({"choices": {"one": [LIGHT], "two": [HEAVY]}}, r"'motor\.tau' is in choices\['one'\] and in choices\['two'\]"),
+        ({"goal": lambda _: "3"}, r"'objective' gives '3' at gear\.ratio = 5\. It must give a number"),
+        ({"goal": lambda _: None}, "'objective' gives None"),
+        ({"goal": lambda _: 1j}, "'objective' gives 1j"),
+        ({"functions": {"price": lambda _: "a"}, "require": {"price": (None, 1.0)}}, "'price' gives 'a'"),
     ],
 )
 def test_what_is_wrong_is_said(change: dict[str, object], words: str) -> None:
     arguments: dict[str, object] = {"variables": {"gear.ratio": (2.0, 60.0)}, "goal": "end JL.omega", **change}
     with pytest.raises(sw.ParameterError, match=words):
         sw.optimize(axis(), t_end=1.0, **arguments)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_a_function_without_a_finite_value_is_named_with_the_place(value: float) -> None:
+    span, limits = {"gear.ratio": (2.0, 60.0)}, {"price": (None, 1.0)}
+    as_goal = sw.optimize(axis(), span, lambda _: value, t_end=1.0)
+    as_limit = sw.optimize(
+        axis(), span, "end JL.omega", t_end=1.0, functions={"price": lambda _: value}, require=limits
+    )
+    for optimum, name in ((as_goal, "objective"), (as_limit, "price")):
+        with pytest.raises(sw.SimulationError, match=rf"{name} is {value:g} at gear\.ratio = 5\. Give functions"):
+            _ = optimum.best
+
+
+def test_at_the_edge_of_a_function_the_slope_is_that_of_the_side_which_has_values() -> None:
+    best = sw.optimize(
+        axis(),
+        {"gear.ratio": (2.0, 60.0)},
+        lambda values: values["gear.ratio"] ** 2 if values["gear.ratio"] <= 5.0 else np.nan,  # starts at 5
+        t_end=1.0,
+    )
+    assert best.values["gear.ratio"] == pytest.approx(2.0, rel=1e-9)  # the lower end, to the tolerance of the descent
 
 
 def test_a_design_without_motion_is_no_design() -> None:

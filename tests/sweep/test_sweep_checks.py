@@ -102,6 +102,38 @@ def test_why_names_the_cause() -> None:
     assert made.why.startswith("a speed is prescribed")
 
 
+def test_where_the_first_variant_fails_the_others_run_side_by_side_all_the_same() -> None:
+    pytest.importorskip("numba")
+    net = sw.Network("stop")
+    net.add(sw.TorqueSource("motor", tau=2.0), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.HardStop("h", upper=0.3, lower=-0.1, c=1e4, d=10.0), "a", "b")
+    net.add(sw.Inertia("J2", J=2.0), "b")
+    alone = net.simulate(0.5)["J.omega"][-1]
+    found = sw.studies.sweep(
+        net, samples={"h.upper": np.r_[-5.0, np.full(15, 0.3)]}, t_end=0.5, measures=["end J.omega"], processes=1
+    )
+    assert found.why == ""
+    assert "must be below upper" in found.reasons[0]
+    assert found.measures["end J.omega"][1:] == pytest.approx(alone, rel=1e-6)  # both to rtol 1e-8
+
+
+@pytest.mark.parametrize("first", [-0.05, 0.0, 0.3])
+def test_whatever_the_first_variant_is_each_starts_at_its_rigid_limit_as_if_alone(first: float) -> None:
+    """Pushed for t = 0.5 s by 2 N m, J of 1 kg m^2 turns alone, or with J2 of 2 kg m^2 from an upper limit of zero."""
+    net = sw.Network("stop")
+    net.add(sw.TorqueSource("motor", tau=2.0), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.HardStop("h", upper=0.3, lower=-0.1), "a", "b")
+    net.add(sw.Inertia("J2", J=2.0), "b")
+    upper = np.r_[first, -0.05, 0.0, np.full(13, 0.3)]
+    found = sw.studies.sweep(net, samples={"h.upper": upper}, t_end=0.5, measures=["end J.omega"], processes=1)
+    speeds = np.select([upper < 0.0, upper == 0.0], [np.nan, 1.0 / 3.0], 1.0)
+    assert found.measures["end J.omega"] == pytest.approx(speeds, rel=1e-7, nan_ok=True)  # rtol is 1e-8
+    assert ["is rigid" in reason for reason in found.reasons] == np.isnan(speeds).tolist()
+    assert "first of them fails" not in found.why
+
+
 @pytest.mark.slow
 def test_what_hardly_moves_is_known_with_a_smaller_tolerance() -> None:
     """A linear motion is proportional to its load; the absolute tolerance, that of 0.001 rad/s, is not."""

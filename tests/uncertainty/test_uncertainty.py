@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 import numpy as np
@@ -121,6 +122,26 @@ def test_a_failed_sample_counts_as_passing_a_limit() -> None:
     assert made.values("y").size == 400 - made.sweep.failed.sum()
     with pytest.raises(sw.ParameterError, match="indices need all of them"):
         uncertainty(broken, {"a": (0.0, 1.0)}, samples=64, method="sobol").indices("y")
+
+
+@pytest.mark.parametrize("side", ["above", "below"])
+@pytest.mark.parametrize("limit", [np.nan, np.inf, "1"])
+def test_a_limit_that_is_no_finite_number_is_refused(side: str, limit: object) -> None:
+    samples = uncertainty(lambda columns: {"y": columns["a"]}, {"a": (0.0, 1.0)}, samples=8)
+    with pytest.raises(sw.ParameterError, match=f"{side} = .* must be a"):
+        samples.probability("y", **{side: limit})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("method", "names"), [("sobol", "S1 and ST"), ("morris", r"mu\* and sigma")])
+def test_what_is_shown_says_why_there_are_no_indices(method: str, names: str) -> None:
+    def broken(columns: Columns) -> Columns:
+        return {"y": np.where(columns["a"] > 0.5, np.nan, 0.0)}
+
+    found = uncertainty(broken, {"a": (0.0, 1.0)}, samples=16, method=method)
+    said = rf"No {names}: \d+ samples of {len(found)} failed, and indices need all of them"
+    assert re.search(said, str(found).splitlines()[-1])
+    assert re.search(said, found._repr_html_())
+    assert "failed, and" not in str(uncertainty(broken, {"a": (0.0, 1.0)}, samples=16))  # random: there are none anyway
 
 
 def test_bands_hold_the_courses_and_the_mean() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.parameters import is_quantity
+from shaftwork.core.parameters import LARGEST, is_quantity
 from shaftwork.results.observer import array_in_si
 
 
@@ -31,12 +31,12 @@ def read_records(record: Any) -> tuple[str, list[dict[str, RecordedSeries]]]:
     """Whether over times "t" or frequencies "f", and what each of one or several records holds, by label.
 
     Raises:
-        ParameterError: there is none, or one is none; some are over times and some over frequencies.
+        ParameterError: there is none, or one is none, says which; some are over times and some over frequencies.
     """
-    is_list = isinstance(record, list | tuple)
-    if is_list and not record:
+    listed = record if isinstance(record, list | tuple) else [record]
+    if not listed:
         raise ParameterError("There is no record. Give {'t': times, 'shaft.tau': values}, or several in a list.")
-    domains, records = zip(*(_read(one) for one in (record if is_list else [record])), strict=True)
+    domains, records = zip(*(_read(one, number, len(listed)) for number, one in enumerate(listed, 1)), strict=True)
     if len(set(domains)) > 1:
         raise ParameterError("Some records are over times and some over frequencies. Fit them one after the other.")
     if len(records) == 1:
@@ -46,11 +46,26 @@ def read_records(record: Any) -> tuple[str, list[dict[str, RecordedSeries]]]:
     ]
 
 
-def _read(record: Any) -> tuple[str, dict[str, RecordedSeries]]:
+def _read(record: Any, number: int, count: int) -> tuple[str, dict[str, RecordedSeries]]:
+    """Whether over times "t" or frequencies "f", and what is recorded there; an error says in which of several.
+
+    Raises:
+        ParameterError: as `_series` says.
+    """
+    try:
+        return _series(record)
+    except ParameterError as error:
+        if count == 1:
+            raise
+        raise ParameterError(f"Record {number}: {error}") from None
+
+
+def _series(record: Any) -> tuple[str, dict[str, RecordedSeries]]:
     """Whether over times "t" or frequencies "f", and what is recorded there, in ascending order.
 
     Raises:
-        ParameterError: there is neither or both, a column has another length, or no value.
+        ParameterError: there is neither or both, a column has another length, no value or one that is too large, or
+            all values are at the start.
     """
     if not hasattr(record, "items"):
         raise ParameterError(f"{reprlib.repr(record)} is no record. Give {{'t': times, 'shaft.tau': values}}.")
@@ -65,7 +80,12 @@ def _read(record: Any) -> tuple[str, dict[str, RecordedSeries]]:
     at = array_in_si(domain, columns.pop(domain), {"t": "s", "f": "Hz"}[domain])
     if not (at.size and np.isfinite(at).all() and at.min() >= 0.0):
         raise ParameterError(f"'{domain}' must be numbers from zero on. A motion starts at t = 0 s.")
-    return domain, {name: _one_series(name, column, at, domain) for name, column in columns.items()}
+    _refuse_huge(domain, at)
+    series = {name: _one_series(name, column, at, domain) for name, column in columns.items()}
+    if domain == "t" and not any(one.at[-1] for one in series.values()):
+        names = ", ".join(f"'{name}'" for name in series)
+        raise ParameterError(f"{names}: all values are at t = 0 s, where a motion only starts. Give later ones.")
+    return domain, series
 
 
 def _one_series(name: str, column: Any, at: Array, domain: str) -> RecordedSeries:
@@ -85,5 +105,14 @@ def _one_series(name: str, column: Any, at: Array, domain: str) -> RecordedSerie
     there = np.isfinite(ordered)
     if not there.any():
         raise ParameterError(f"'{name}' has no finite value.")
+    _refuse_huge(name, ordered[there])
     parts = [ordered] if domain == "t" else [ordered.real, ordered.imag]
     return RecordedSeries(name, at[order][there], np.concatenate([part[there] for part in parts]))
+
+
+def _refuse_huge(name: str, values: Array) -> None:
+    if (largest := np.abs(values).max()) > LARGEST:
+        raise ParameterError(
+            f"'{name}' has a value of size {largest:g}; records hold numbers in SI up to {LARGEST:g}. Correct it, "
+            "or leave its row out."
+        )

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array
-from shaftwork.core.errors import NetworkError, SimulationError
+from shaftwork.core.errors import NetworkError, ParameterError, SimulationError, in_one_line
 from shaftwork.numerics.differences import differences
+from shaftwork.optimization.optimum import in_words
 from shaftwork.pipeline.network import Network
 from shaftwork.results.measures import Measure
 from shaftwork.sensitivities.parametric_motion import ParametricMotion
@@ -46,6 +48,8 @@ class MeasuredMotion:
         self._motion = ParametricMotion(net.compile(), quantities, self._integrands, names, (0.0, t_end), initial, rtol)
         self._fixed = self._motion.model.parameters
         self._last: tuple[bytes, dict[str, tuple[float, Array]]] = b"", {}
+        self._failure = ""
+        """Why there is no motion for the last variables; empty where there is."""
         self.motions = 0
         """How many were computed."""
 
@@ -59,17 +63,26 @@ class MeasuredMotion:
             self._last = key, self._computed(variables)
         return self._last[1]
 
+    def undefined(self, variables: Array) -> str:
+        """Which goal has no finite value and why; empty where all have one."""
+        goals = {name: value for name, (value, _) in self.at(variables).items() if not np.isfinite(value)}
+        if goals and self._failure:
+            return f"there is no motion ({self._failure})"
+        return next((f"{name} is {value:g}" for name, value in goals.items()), "")
+
     def _computed(self, variables: Array) -> dict[str, tuple[float, Array]]:
         values, results = self.values(variables), dict[str, tuple[float, Array]]()
+        self._failure = ""
         if self._read:
             self.motions += 1
             try:
                 results = self._measures(values)
-            except (SimulationError, NetworkError):
+            except (SimulationError, NetworkError) as error:
+                self._failure = in_one_line(error).rstrip(".")
                 results = {name: (np.nan, np.zeros(variables.size)) for name in self._read}
         for name, goal in self._goals.items():
             if not isinstance(goal, str):
-                results[name] = self._of_parameters(goal, variables)
+                results[name] = self._of_parameters(name, goal, variables)
         return results
 
     def _measures(self, values: Mapping[str, float]) -> dict[str, tuple[float, Array]]:
@@ -87,9 +100,31 @@ class MeasuredMotion:
         slopes = differences(lambda x: np.array([measure.of(self._motion.motion(self.values(x)).solution)]), at, steps)
         return np.asarray(slopes[0])
 
-    def _of_parameters(self, goal: Callable[[Mapping[str, float]], float], variables: Array) -> tuple[float, Array]:
-        def value(at: Array) -> Array:
-            return np.array([goal({**self._fixed, **self.values(at)})], dtype=float)
+    def _of_parameters(
+        self, name: str, goal: Callable[[Mapping[str, float]], float], variables: Array
+    ) -> tuple[float, Array]:
+        """What a function gives, with its gradient.
 
+        Raises:
+            ParameterError: it gives no number.
+            SimulationError: it is finite here, but on neither side.
+        """
+
+        def value(at: Array) -> float:
+            result: Any = goal({**self._fixed, **self.values(at)})
+            try:
+                return float(1.0 * result)  # a product, as float alone reads texts
+            except TypeError:
+                raise ParameterError(
+                    f"The function '{name}' gives {result!r} at {in_words(self.values(at))}. It must give a number."
+                ) from None
+
+        def finite(at: Array) -> Array:
+            if not np.isfinite(result := value(at)):
+                raise SimulationError(f"The function '{name}' is {result:g} at {in_words(self.values(at))}.")
+            return np.array([result])
+
+        if not np.isfinite(here := value(variables)):
+            return here, np.zeros(variables.size)
         steps = 1e-6 * np.where(variables == 0.0, 1.0, np.abs(variables))
-        return float(value(variables)[0]), differences(value, variables, steps)[0]
+        return here, differences(finite, variables, steps)[0]

@@ -78,7 +78,7 @@ def optimize(
     name = goal if isinstance(goal, str) else OBJECTIVE
     goals = {name: goal, **{other: (functions or {}).get(other, other) for other in limits}}
     _, end = time_span(0.0, t_end)
-    taken = _combinations(choices)
+    taken = _combinations(choices, ranges)
     attempts: list[Attempt] = []
     with progress(len(taken) * starts, "starts", "compiling") as show:
         for choice, values in taken:
@@ -110,12 +110,23 @@ def _ranges(net: Network, variables: Any) -> dict[str, tuple[float, float]]:
 
 
 def _combinations(
-    choices: Mapping[str, Iterable[Mapping[str, float]]] | None,
+    choices: Mapping[str, Iterable[Mapping[str, float]]] | None, variables: Iterable[str]
 ) -> list[tuple[dict[str, int], dict[str, float]]]:
-    """The number taken of each catalogue, and all parameters that this sets."""
+    """The number taken of each catalogue, and all parameters that this sets.
+
+    Raises:
+        ParameterError: a catalogue has no sets of parameters, or one is set twice.
+    """
     lists = {name: list(sets) for name, sets in (choices or {}).items()}
     if empty := [name for name, sets in lists.items() if not sets]:
         raise ParameterError(f"There is nothing to choose from in '{empty[0]}'.")
+    setters = dict.fromkeys(variables, "variables")
+    for name, sets in lists.items():
+        if wrong := [one for one in sets if not isinstance(one, Mapping)]:
+            raise ParameterError(f"choices['{name}'] holds {wrong[0]!r}. Give sets of values, such as {{'J1.J': 2.0}}.")
+        for key in dict.fromkeys(key for one in sets for key in one):
+            if setters.setdefault(key, f"choices['{name}']") != f"choices['{name}']":
+                raise ParameterError(f"'{key}' is in {setters[key]} and in choices['{name}']. Leave it out of one.")
     combinations = []
     for numbers in product(*(range(len(sets)) for sets in lists.values())):
         choice = dict(zip(lists, numbers, strict=True))
@@ -146,8 +157,8 @@ def _attempt(
     low, high = np.array(list(ranges.values())).T
     width, before = high - low, motion.motions
     first = {of: value for of, (value, _) in motion.at(start).items()}
-    if not all(map(np.isfinite, first.values())):
-        return Attempt(choice, {**fixed, **motion.values(start)}, first, "no motion at the start", motion.motions)
+    if reason := motion.undefined(start):
+        return Attempt(choice, {**fixed, **motion.values(start)}, first, reason, motion.motions - before)
     sizes = {
         of: max(map(abs, (value, *(end or 0.0 for end in limits.get(of, ()))))) or 1.0 for of, value in first.items()
     }
@@ -155,7 +166,7 @@ def _attempt(
     def side(of: str, factor: float, level: float = 0.0) -> dict[str, Any]:
         def value(shares: Array) -> float:
             value = motion.at(low + shares * width)[of][0]
-            if np.isnan(value):  # no motion: as bad as can be, and finite for the line search
+            if not np.isfinite(value):  # no motion, or no number: as bad as can be, and finite for the line search
                 return 1e6 if of == name else -1e6
             return factor * (value - level) / sizes[of]
 
@@ -177,4 +188,5 @@ def _attempt(
     )
     variables = low + np.clip(result.x, 0.0, 1.0) * width
     goals = {of: value for of, (value, _) in motion.at(variables).items()}
-    return Attempt(choice, {**fixed, **motion.values(variables)}, goals, str(result.message), motion.motions - before)
+    message = motion.undefined(variables) or str(result.message)
+    return Attempt(choice, {**fixed, **motion.values(variables)}, goals, message, motion.motions - before)

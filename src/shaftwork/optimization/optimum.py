@@ -23,7 +23,7 @@ class Attempt:
         choice: the number taken of each catalogue.
         values: of variables and of what was chosen, in SI.
         goals: by name.
-        message: why it ended.
+        message: why it ended; of one without a finite value of every goal which has none.
         motions: computed for it.
     """
 
@@ -32,6 +32,11 @@ class Attempt:
     goals: Mapping[str, float]
     message: str
     motions: int
+
+    @property
+    def complete(self) -> bool:
+        """Whether every goal has a finite value."""
+        return all(map(np.isfinite, self.goals.values()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +59,7 @@ class Optimum:
 
     def meets(self, attempt: Attempt) -> bool:
         """Whether a design is within all limits, to a millionth of their size."""
-        if not all(map(np.isfinite, attempt.goals.values())):
+        if not attempt.complete:
             return False
         for name, (low, high) in self.require.items():
             value = attempt.goals[name]
@@ -72,19 +77,26 @@ class Optimum:
         """
         good = [attempt for attempt in self.attempts if self.meets(attempt)]
         if not good:
-            raise SimulationError(
-                f"None of {counted(len(self.attempts), 'descent')} meets all limits: {self._nearest}. Widen a range or "
-                "a limit, or take more starts."
-            )
+            raise SimulationError(self._failure)
         return (max if self.maximize else min)(good, key=lambda attempt: attempt.goals[self.goal])
 
     @property
-    def _nearest(self) -> str:
-        return "; ".join(
-            f"{name} must be within {limits} and is from {min(a.goals[name] for a in self.attempts):.6g} to "
-            f"{max(a.goals[name] for a in self.attempts):.6g}"
+    def _failure(self) -> str:
+        """Why there is no best design."""
+        count, complete = counted(len(self.attempts), "descent"), [a for a in self.attempts if a.complete]
+        undefined = [f"{a.message} at {in_words(a.values)}" for a in self.attempts if not a.complete][:1]
+        if not complete:
+            return (
+                f"None of {count} has a design with all goals: {undefined[0]}. Give functions that are numbers in the "
+                "whole ranges, narrower ranges, or more starts."
+            )
+        nearest = [
+            f"{name} must be within {limits} and is from {min(a.goals[name] for a in complete):.6g} to "
+            f"{max(a.goals[name] for a in complete):.6g}"
             for name, limits in self.require.items()
-        )
+        ]
+        said = "; ".join([*nearest, *undefined])
+        return f"None of {count} meets all limits: {said}. Widen a range or a limit, or take more starts."
 
     @property
     def values(self) -> dict[str, float]:
@@ -121,3 +133,8 @@ class Optimum:
 
     def _repr_html_(self) -> str:
         return html_table(*self._rows())
+
+
+def in_words(values: Mapping[str, float]) -> str:
+    """Values by name, "J.J = 2, shaft.c = 1e+04"."""
+    return ", ".join(f"{name} = {value:.9g}" for name, value in values.items())

@@ -157,6 +157,10 @@ class Ensemble:
         """
         return _VariantCourse(self, columns).go()
 
+    def apart(self, columns: Array) -> Mask:
+        """(k,) whether variants start beyond a rigid limit, or not at one where the first does: they run alone."""
+        return np.zeros(columns.shape[1], dtype=bool)
+
     @property
     def decisive(self) -> bool:
         """Whether a parameter that varies decides in which mode a motion starts."""
@@ -209,7 +213,7 @@ class _VariantCourse:
         ensemble = self.ensemble
         equations = ensemble.equations(ensemble.start)
         assert equations is not None  # noqa: S101 (checked when it was made)
-        lanes = np.flatnonzero(ensemble.alike(self.columns))
+        lanes = np.flatnonzero(ensemble.alike(self.columns) & ~ensemble.apart(self.columns))
         if ensemble.decisive:
             lanes = lanes[[ensemble.starts_alike(column) for column in self.columns[:, lanes].T]]
         size = len(equations.code.model.states)

@@ -165,16 +165,20 @@ class Worker:
         if self.why:
             return None
         kind, span, names = _kind_of(self._model), (0.0, task.t_end), tuple(task.columns)
-        for first in (task.values(0), {}):  # the network itself, where the first variant fails
+        programs = () if self._device is None else (self._device.program,)
+        firsts = ({},) if self._objection(0, task.columns) else (task.values(0), {})
+        for first in firsts:  # the network itself, where the first variant fails
             try:
-                programs = () if self._device is None else (self._device.program,)
-                return kind(self._model, names, first, read, span, options["rtol"], *programs)
+                ensemble = kind(self._model, names, first, read, span, options["rtol"], *programs)
             except CompileError as error:
                 reason = str(error).splitlines()[0].rstrip(".")
                 self.why = reason[0].lower() + reason[1:]
                 return None
             except ShaftworkError:
                 self.why = "the first of them fails, and the network as it is too"
+            else:
+                self.why = ""
+                return ensemble
         return None
 
     def run(self, variants: NDArray[np.intp], rows: Mapping[str, Array] | None = None) -> Chunk:

@@ -11,6 +11,7 @@ from scipy import stats
 
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.notebook import html_table
+from shaftwork.core.parameters import in_si, without_unit
 from shaftwork.core.screen import counted, in_columns
 from shaftwork.results.observer import Array
 from shaftwork.results.plotting import new_figure, plain
@@ -95,7 +96,7 @@ class Uncertainty:
             below: lower limit.
 
         Raises:
-            ParameterError: there is no such measure or no limit.
+            ParameterError: there is no such measure or no limit, or a limit is no finite number.
         """
         if above is None and below is None:
             raise ParameterError("Give a limit, above=... or below=....")
@@ -103,8 +104,9 @@ class Uncertainty:
         rows = self.design.independent
         values = self._column(measure)[rows]
         passing = np.zeros(rows.size, dtype=bool)
-        passing |= False if above is None else values > above
-        passing |= False if below is None else values < below
+        for name, limit, passed in (("above", above, np.greater), ("below", below, np.less)):
+            if limit is not None:
+                passing |= passed(values, in_si(name, without_unit(name, limit, "of the measure, as N m")))
         most = int((passing | self.sweep.failed[rows]).sum())
         low, high = (
             stats.binomtest(count, rows.size).proportion_ci(self.level) for count in (int(passing.sum()), most)
@@ -122,15 +124,22 @@ class Uncertainty:
         column = self._column(measure)
         if self.design.method == "random":
             raise ParameterError("Independent samples tell no indices. Take method='sobol' or 'morris'.")
-        if failed := int(self.sweep.failed.sum()):
-            raise ParameterError(
-                f"{counted(failed, 'sample')} of {len(self)} failed, and indices need all of them; see sweep.reasons."
-            )
+        if self._unranked:
+            raise ParameterError(self._unranked)
         indices = self.design.indices(column, self.level)
         return {
             index: dict(zip(self.design.names, zip(value.tolist(), half.tolist(), strict=True), strict=True))
             for index, (value, half) in indices.items()
         }
+
+    @property
+    def _unranked(self) -> str:
+        """Why there are no indices that were to be had; empty where there are or were not."""
+        failed = int(self.sweep.failed.sum())
+        if self.design.method == "random" or not failed:
+            return ""
+        names, some = "mu* and sigma" if self.design.method == "morris" else "S1 and ST", counted(failed, "sample")
+        return f"No {names}: {some} of {len(self)} failed, and indices need all of them; see sweep.reasons."
 
     def _rows(self) -> list[list[str]]:
         """Cells of the table of distributions."""
@@ -164,11 +173,12 @@ class Uncertainty:
 
     def __str__(self) -> str:
         tables = [in_columns(rows, range(1, len(rows[0]))) for rows in (self._rows(), self._shares()) if rows]
-        return "\n".join([self._title, *chain.from_iterable(tables)])
+        note = [self._unranked] if self._unranked else []
+        return "\n".join([self._title, *chain.from_iterable(tables), *note])
 
     def _repr_html_(self) -> str:
-        tables = [html_table(self._title, rows[0], rows[1:]) for rows in (self._rows(), self._shares()) if rows]
-        return "".join(tables) or html_table(self._title, [], [])
+        note, tables = self._unranked, [rows for rows in (self._rows(), self._shares()) if rows] or [[[]]]
+        return "".join(html_table(self._title, rows[0], rows[1:], note) for rows in tables)
 
     def plot(self) -> Figure:
         """Histograms of the measures, and their indices where there are any (extra `plot`).

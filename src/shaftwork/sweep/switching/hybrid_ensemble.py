@@ -55,6 +55,25 @@ class HybridEnsemble(Ensemble):
         base = equations.vector(self.first, self._equation_sets.numbers(modes))
         return GuardedEquations(code, equations, modes, base, self.names, self.span)
 
+    def apart(self, columns: Array) -> Mask:
+        sets, count = self._equation_sets, columns.shape[1]
+        rigid = [
+            active.machine for active in sets.of(sets.first).watched(sets.first) if active.leave.rebound is not None
+        ]
+        if not rigid:
+            return super().apart(columns)
+        loose = with_modes(self.start, {number: sets.first[number] for number in rigid})
+        if not isinstance(equations := self.equations(loose), GuardedEquations):
+            return np.ones(count, dtype=bool)
+        values = {**self.model.parameters, **self.first}
+        p = equations.parameters(np.column_stack([columns, [values[name] for name in self.names]]))
+        x = np.zeros((len(equations.code.model.states), count + 1))
+        _, guards = equations.code.motion(np.full(count + 1, self.span[0]), x, p)
+        limits = [active for active in equations.kirchhoff.watched(loose) if active.leave.rebound is not None]
+        excess = np.array([active.side * guards[active.guard] for active in limits])
+        lanes, first = excess[:, :-1], excess[:, -1:]
+        return np.asarray(np.where(first < 0.0, lanes > 0.0, lanes != first).any(axis=0))
+
     @cached_property
     def decisive(self) -> bool:
         """Whether a parameter that varies decides in which mode a motion starts."""
