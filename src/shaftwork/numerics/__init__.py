@@ -1,1 +1,1 @@
-"""Polynomials, collocation tables, points in boxes and searches for zeros that all stages share; nothing here knows a drive train."""
+"""Polynomials, collocation tables, points in boxes, zeros: what all stages share; nothing here knows a drive train."""
