@@ -1,1 +1,1 @@
-"""Polynomials, collocation tables, points in boxes and zeros that all stages share; nothing knows a drive train."""
+"""Polynomials, collocation tables, points in boxes, zeros: what all stages share; nothing here knows a drive train."""
