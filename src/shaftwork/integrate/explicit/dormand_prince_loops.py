@@ -277,10 +277,9 @@ def _end_at_switch(looks, part, c, end, limits, atol, rtol, rate):  # type: igno
     """
     system, places, t, step, shapes, course = looks
     if c < 0:
-        for switch in places:  # within its band
-            if switch >= system[2] and _height(course, PARTS.size - 1, switch) < 0:
-                limits[5] += 1
-                break
+        for switch in places:
+            near = abs(course[0, switch]) <= LEFT * abs(course[PARTS.size + 1, switch] - course[0, switch])
+            limits[5] += near and switch >= system[2]
         return np.inf
     y, rests = shapes[SHAPES + 1], course[PARTS.size + 4]
     time, longest, value = t + part * step, np.inf, course[0, c]
