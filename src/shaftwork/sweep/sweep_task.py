@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from shaftwork.sweep.device.device_lanes import Device
     from shaftwork.sweep.ensemble import Ensemble
 
-SIDE_BY_SIDE, FIRST_CHUNK, CHUNK, DEVICE_CHUNK, LONE_CHUNK = 16, 128, 2048, 65536, 8
+SIDE_BY_SIDE, FIRST_CHUNK, CHUNK, DEVICE_CHUNK, LONE_CHUNK = 16, 512, 2048, 65536, 8
 """Variants: from which on it is worth while to compile a program for many of them; and that are computed and stored at
 once: side by side at first and at most, on a graphics processor, and one by one."""
 
