@@ -202,9 +202,7 @@ class EventIteration:
             idle = [] if latest else [*idle, worst]
             seen[state.regime.modes] = None
             state, worst = _worst(state, after, before, idle, repeats)
-            if (
-                worst is None and late
-            ):  # in the modes that go on, how long ago it was hit, if nothing stops it meanwhile
+            if worst is None and late:  # on from where it was hit, in the modes that go on, if nothing stops it
                 later, late = state.moved(after, late), 0.0
                 if not passes_limit(later, after):
                     state, worst = _worst(later, after, before, idle, repeats)
