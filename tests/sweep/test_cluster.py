@@ -61,6 +61,19 @@ def test_the_cluster_gives_the_bits_of_one_process(client: Any) -> None:
         assert one.measures[name].tobytes() == many.measures[name].tobytes()
 
 
+def test_a_call_brings_hardly_more_than_it_does(client: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Dask keeps the last 1000 messages: those of slow variants must not each bring all that is still to be done."""
+    sent, submit = [], client.submit
+
+    def counted(function: Any, *arguments: Any, **options: Any) -> Any:
+        sent.append(arguments[-2].size)
+        return submit(function, *arguments, **options)
+
+    monkeypatch.setattr(client, "submit", counted)
+    sw.studies.sweep(sw.scenes.crane_start(), samples=samples(8000), t_end=800.0, measures=MEASURES, on=client)
+    assert sum(sent) <= 3 * 8000
+
+
 def test_variants_one_by_one_and_failed_ones_are_the_same(client: Any) -> None:
     call: dict[str, Any] = {
         "samples": {"shaft.c": np.append(np.linspace(2e4, 3e4, 30), 2e4)},

@@ -16,7 +16,7 @@ import numpy as np
 from shaftwork.core.errors import ParameterError, ShaftworkError, SimulationError, imported
 from shaftwork.core.notices import warn
 from shaftwork.results.observer import Array
-from shaftwork.sweep.sweep_task import SIDE_BY_SIDE, Chunk, Index, Task, Worker, parted
+from shaftwork.sweep.sweep_task import SIDE_BY_SIDE, Chunk, Index, Task, Worker
 
 _workers: dict[bytes, Worker] = {}
 """The worker of the last sweep of a process, by the bytes of its task."""
@@ -72,7 +72,9 @@ class _Calls:
                 f"A measure cannot be sent to a cluster: {error}. Give a function of a file."
             ) from None
         self._head = head, libraries(), worker.why
-        self._rest = parted(variants, 8 * worker.chunk)[::-1]
+        self._rest = [variants] if variants.size else []
+        self._size, self._most = worker.chunk, 8 * worker.chunk
+        """Variants of a call, about twice what one does: each client and scheduler keeps its last 1000 messages."""
         self._done: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._suspected: list[Index] = []
         self._alone: Any = None
@@ -93,8 +95,15 @@ class _Calls:
         if self._suspected and not self.waiting:
             self._alone = self._send(self._suspected.pop())
         while self._rest and not self._suspected and self._alone is None and len(self.waiting) < self._room:
-            self._send(self._rest.pop())
+            self._send(self._taken())
         return bool(self.waiting)
+
+    def _taken(self) -> Index:
+        """The next variants, which do not wait any more."""
+        variants = self._rest.pop()
+        if variants.size > self._size:
+            self._rest.append(variants[self._size :])
+        return variants[: self._size]
 
     def _send(self, variants: Index) -> Any:
         """The future of some variants."""
@@ -144,6 +153,8 @@ class _Calls:
             ) from error
         if (count := sum(chunk.variants.size for chunk in done)) < variants.size:
             self._rest.append(variants[count:])
+        if not alone:
+            self._size = min(2 * count, self._most)
         self._calls += 1
         return done
 
