@@ -82,7 +82,7 @@ def _put(interval, low, left, high, right, missed, room):  # type: ignore[no-unt
 def _top(tables, probe, stack, row, sign, offset, best, near, enough):  # type: ignore[no-untyped-def]
     """The largest value in the interval that is on the stack, and when; or the first that is seen above `enough`.
 
-    NaN where no peak can be told.
+    NaN where too many places were looked at in vain.
     """
     count, when, looks = 1, stack[0, 0], 0
     while count:
@@ -120,7 +120,7 @@ def _top(tables, probe, stack, row, sign, offset, best, near, enough):  # type: 
 
 @inner
 def _first_met(tables, now, probe, stack, lane):  # type: ignore[no-untyped-def]
-    """The guard that is met first in the last step of a lane, and when in s; Met.NOTHING where none is."""
+    """The guard that is met first in the last step of a lane, and when in s; else Met.NOTHING, or Met.A_LIMIT if unknown."""
     low, high = now[LaneRow.LAST_TIME.value, lane], now[LaneRow.TIME.value, lane]
     met, end = Met.NOTHING.value, high
     for guard in range(tables[LaneNumber.GUARDS.value]):
@@ -138,7 +138,9 @@ def _first_met(tables, now, probe, stack, lane):  # type: ignore[no-untyped-def]
             _put(stack[0], low, left, high, right, 0.0, 0.0)
             near = TYPED * max(abs(left[0]), abs(right[0]))
             value, upper = _top(tables, probe, stack, row, side, offset, 0.0, near, 0.0)
-        if not value > 0:
+        if np.isnan(value):
+            return Met.A_LIMIT.value, end
+        if value <= 0:
             continue
         share = (upper - low) / (high - low)
         guess = low + (high - low) * root(powers(high - low, left, right), 0.0, share, 1.0)
@@ -163,8 +165,12 @@ def _past(tables, probe, end):  # type: ignore[no-untyped-def]
 
 @inner
 def _measure(tables, now, probe, stack, seen, lane, end):  # type: ignore[no-untyped-def]
-    """Take the inside of the last step of a lane into the extremes, up to a time in s and what is seen there."""
-    low = now[LaneRow.LAST_TIME.value, lane]
+    """Take the inside of the last step of a lane into the extremes, up to a time in s and what is seen there.
+
+    Returns:
+        Whether all of them are known.
+    """
+    known, low = True, now[LaneRow.LAST_TIME.value, lane]
     for k in range(tables[LaneNumber.EXTREMES.value]):
         sign, row = now[tables[LaneRow.SIGNS.value] + k, lane], tables[LaneRow.SIGHT.value] + JET * k
         left = _jet(now, tables[LaneRow.LAST_SIGHT.value] + JET * k, sign, 0.0, lane)
@@ -174,6 +180,8 @@ def _measure(tables, now, probe, stack, seen, lane, end):  # type: ignore[no-unt
         _put(stack[0], low, left, end, right, 0.0, 0.0)
         best, _ = _top(tables, probe, stack, row, sign, 0.0, best, TYPED * (best - lowest), np.inf)
         now[tables[LaneRow.BEST.value] + k, lane], now[tables[LaneRow.LOWS.value] + k, lane] = best, lowest
+        known = known and not np.isnan(best)
+    return known
 
 
 @inner
@@ -211,13 +219,13 @@ def _begin(tables, now, lane):  # type: ignore[no-untyped-def]
 
 @inner
 def _arrived(tables, course, now, probe, there, stack, lane):  # type: ignore[no-untyped-def]
-    """Whether a lane is done: it has met a guard in its last step, or is at its end."""
+    """Whether a lane is done: it has met a guard in its last step, is at its end, or what it has met is unknown."""
     met, end, last = Met.NOTHING.value, now[LaneRow.TIME.value, lane], now[LaneRow.END.value, lane]
     seen, x, guards = now, tables[LaneRow.X.value], tables[LaneNumber.GUARDS.value]
     if now[LaneRow.CLOSE.value, lane] > 0:
         _repeat(tables, now, probe, lane)
         met, end = _first_met(tables, now, probe, stack, lane)
-        if met != Met.NOTHING.value:
+        if met >= 0:
             _probe(tables, probe, end)
             if met >= guards - tables[LaneNumber.FREE.value]:
                 end = _past(tables, probe, last)
@@ -225,7 +233,8 @@ def _arrived(tables, course, now, probe, there, stack, lane):  # type: ignore[no
             for row in range(tables[LaneRow.HEIGHT.value]):
                 there[row, lane] = probe[row, lane]
             seen, x = there, tables[LaneRow.NEW.value]
-        _measure(tables, now, probe, stack, seen, lane, end)
+        if met == Met.A_LIMIT.value or not _measure(tables, now, probe, stack, seen, lane, end):
+            return True  # as it was loaded, A_LIMIT
     if met == Met.NOTHING.value and end >= last:
         met = Met.THE_END.value
     if met != Met.NOTHING.value:

@@ -140,7 +140,7 @@ class StepWriter:
             left, right = (self._jet(name, len(self._signs) + guard, side) for name in ("last_sight", "sight"))
             left[0], right[0] = self._difference(left[0], offset), self._difference(right[0], offset)
             above = build.fcmp_ordered(">", right[0], zero)
-            reaches = build.fcmp_ordered(">", self._sum(self._reach(left, right)), zero)
+            reaches = build.not_(build.fcmp_ordered("<=", self._sum(self._reach(left, right)), zero))  # NaN as well
             watched = build.fcmp_ordered("!=", side, zero)
             close = build.or_(close, build.and_(watched, build.or_(above, reaches)))
         for k, sign in enumerate(self._signs):

@@ -42,8 +42,8 @@ class InnerSearch:
         self.extremes, self.watched = len(signs), len(signs) + guards
 
     def begun(self, lanes: int) -> dict[str, Any]:
-        """The memory of a search."""
-        counts = {name: np.zeros(lanes, dtype=np.int32) for name in ("depth", "looks")}
+        """The memory of a search; lost are lanes in which no end of it was found."""
+        counts = {name: np.zeros(lanes, dtype=np.int32) for name in ("depth", "looks", "lost")}
         return {
             "stack": np.zeros(((self.watched + DEPTH) * lanes, INTERVAL)),
             "interval": np.zeros((INTERVAL, lanes)),
@@ -82,6 +82,7 @@ class InnerSearch:
         left, right = (self.jets(memory, name) for name in ("last_sight", "sight"))
         inside, beyond = self._reach(memory["time"] - memory["last_time"], left, right)
         watched, above = close & (memory["sides"] != 0.0), right[0, first:] > 0
+        memory["lost"] = memory["lost"] | numpy.any(watched & numpy.isnan(right[0, first:]), axis=0)
         uppers = numpy.where(watched & above, memory["time"], np.inf)
         memory["uppers"] = numpy.where(close, uppers, memory["uppers"])
         perhaps = watched & ~above & ((inside + beyond)[first:] > 0)
@@ -126,7 +127,7 @@ class InnerSearch:
 
     def next(self, memory: dict[str, Any], on: Any) -> Any:
         """Whether some lanes have an interval to be looked into, at their goal; those that have none are done."""
-        numpy, names = self._numpy, ("stack", "depth", "interval", "height", "goal", "best", "looks")
+        numpy, names = self._numpy, ("stack", "depth", "interval", "height", "goal", "best", "looks", "lost")
 
         def waiting(now: dict[str, Any], found: Any) -> Any:
             return on & ~found & (now["depth"] > 0)
@@ -159,7 +160,7 @@ class InnerSearch:
         self._raise(memory, sure, number, height)
         full = (memory["looks"] > LOOKS) | (depth + 2 > self.watched + DEPTH)
         found = higher & ~sure & ~full
-        self._raise(memory, higher & ~sure & full, number, numpy.full(lanes, np.nan))
+        memory["lost"] = memory["lost"] | (higher & ~sure & full)
         for name, new in (("interval", interval), ("height", height), ("goal", t)):
             memory[name] = numpy.where(found, new, memory[name])
         memory["looks"] = memory["looks"] + found
@@ -172,7 +173,7 @@ class InnerSearch:
         return (part < 0.01) & (missed * part**3 < near)
 
     def _raise(self, memory: dict[str, Any], on: Any, number: Any, value: Any) -> None:
-        """Let the largest value of an extreme of some lanes be no less than another; no number where that is none."""
+        """Let the largest value of an extreme of some lanes be no less than another."""
         best, numbers = memory["best"], np.arange(self.extremes)[:, None]
         higher = self._numpy.maximum(best, value.astype(best.dtype))
         memory["best"] = self._numpy.where(on & (numbers == number), higher, best)

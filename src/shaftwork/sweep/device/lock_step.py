@@ -166,8 +166,10 @@ class LockStep:
         settled = self._look(memory, close) if self._search.watched else close
         over = memory["time"][0] >= memory["end"][0]
         arrived = moved & ~close & over | settled & (over | (memory["met"] >= 0))
+        lost = memory["lost"] > 0
         self._set(memory, arrived & (memory["met"] < 0), met=int(Met.THE_END))
-        self._set(memory, arrived | self._hopeless(memory), mode=int(LaneTask.DONE))
+        self._set(memory, lost, met=int(Met.A_LIMIT))
+        self._set(memory, arrived | lost | self._hopeless(memory), mode=int(LaneTask.DONE))
 
     def _look(self, memory: dict[str, Any], close: Any) -> Any:
         """Look into last steps; which lanes have nothing more to be looked at."""
