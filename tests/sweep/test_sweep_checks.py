@@ -179,3 +179,21 @@ def test_a_grid_of_absurd_size_is_refused_with_its_number() -> None:
     grid = {"J.J": values, "d.d": values, "motor.tau": values}
     with pytest.raises(sw.ParameterError, match=r"A grid of 1280 x 1280 x 1280 values has 2097152000 variants"):
         sw.studies.sweep(net, grid, t_end=0.1, measures=["end J.omega"])
+
+
+def test_a_measure_that_other_processes_do_not_find_is_refused_where_they_are_asked_for() -> None:
+    call: dict[str, Any] = {"t_end": 0.1, "measures": {"speed": lambda solution: float(solution["J.omega"][-1])}}
+    net = train(sw.Damper("oil", d=1.0))
+    assert not sw.studies.sweep(net, {"J.J": [1.0, 2.0]}, **call).failed.any()
+    with pytest.raises(sw.ParameterError, match="processes = 2: other processes do not find a measure .* lambda"):
+        sw.studies.sweep(net, {"J.J": [1.0, 2.0]}, processes=2, **call)
+
+
+def test_a_named_engine_follows_each_variant_by_itself() -> None:
+    pytest.importorskip("numba")
+    call: dict[str, Any] = {"t_end": 0.1, "measures": ["end J.omega"], "processes": 1}
+    net = train(sw.Damper("oil", d=1.0))
+    made = sw.studies.sweep(net, {"J.J": np.linspace(1.0, 2.0, 20)}, engine="numba", **call)
+    assert made.why == "engine = 'numba' was asked for"
+    alone = net.compile().simulate(0.1, engine="numba", parameters={"J.J": 1.0}, t_eval=2)
+    assert made.measures["end J.omega"][0] == alone["J.omega"][-1]

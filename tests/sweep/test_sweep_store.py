@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import json
+import re
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import shaftwork as sw
+from shaftwork.components import REGISTRY
 
 STIFFNESSES = np.linspace(500.0, 900.0, 20)
 """More than two chunks of variants that run one by one."""
 
 
-def swept(store: Path | None) -> sw.studies.Sweep:
+def swept(store: Path | None, t_end: float = 0.1) -> sw.studies.Sweep:
     net = sw.Network("swing")
     net.add(sw.TorqueSource("motor", tau=5.0), "a")
     net.add(sw.Inertia("J", J=1.0), "a")
@@ -25,7 +30,7 @@ def swept(store: Path | None) -> sw.studies.Sweep:
     return sw.studies.sweep(
         net,
         {"shaft.c": STIFFNESSES},
-        t_end=0.1,
+        t_end=t_end,
         measures=["max shaft.tau", "end J.omega"],
         engine="scipy",
         processes=1,
@@ -98,15 +103,73 @@ def test_the_database_of_something_else_is_refused_and_stays_as_it_is(tmp_path: 
     assert path.read_bytes() == before
 
 
-def test_a_store_of_another_version_is_refused(whole: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("library", ["shaftwork", "numpy"])
+def test_a_store_of_another_version_is_refused(whole: Path, tmp_path: Path, library: str) -> None:
     path = copied(whole, tmp_path / "store.sqlite")
     with opened(path) as database:
-        assert database.execute("SELECT value FROM sweep WHERE what = 'version'").fetchone() == (sw.__version__,)
-        database.execute("UPDATE sweep SET value = '0.0.9' WHERE what = 'version'")
-    with pytest.raises(
-        sw.ParameterError, match=rf"begun by version 0\.0\.9 of Shaftwork, and this is {sw.__version__}"
-    ):
+        (text,) = database.execute("SELECT value FROM sweep WHERE what = 'libraries'").fetchone()
+        now = json.loads(text)[library]
+        older = json.dumps({**json.loads(text), library: "0.0.9"})
+        database.execute("UPDATE sweep SET value = ? WHERE what = 'libraries'", (older,))
+    with pytest.raises(sw.ParameterError, match=rf"begun with {library} 0\.0\.9, and this is {re.escape(now)}: other"):
         swept(path)
+
+
+def test_a_store_of_another_sweep_is_not_called_damaged(whole: Path, tmp_path: Path) -> None:
+    path = copied(whole, tmp_path / "store.sqlite")
+    with pytest.raises(sw.ParameterError, match="holds another sweep, which differs in its t_end") as caught:
+        swept(path, t_end=0.2)
+    assert "damaged" not in str(caught.value)
+    assert "Delete" not in str(caught.value)
+
+
+def test_a_store_is_that_of_the_laws_of_its_parts(tmp_path: Path) -> None:
+    """Two parts of the same name and numbers, whose laws differ, and rows of balls that are hit in two ways."""
+
+    def fan(power: int) -> sw.Network:
+        @sw.component
+        class Fan(sw.Component):
+            d: float = sw.parameter("1", "factor")
+            role = "loss"
+            ports = (sw.Port("a"),)
+
+            def branches(self, p: Any) -> Iterator[Any]:
+                yield sw.ThroughLaw(p.d * sw.ACROSS**power, ("a", None), "tau")
+
+        del REGISTRY["Fan"]
+        net = sw.Network("fan")
+        net.add(sw.TorqueSource("motor", tau=5.0), "a")
+        net.add(sw.Inertia("J", J=1.0), "a")
+        net.add(Fan("fan", d=0.1), "a")
+        return net
+
+    def balls(impacts: str) -> sw.Network:
+        net = sw.Network("balls", impacts=impacts)
+        net.add(sw.TorqueSource("motor", tau=5.0), "a")
+        net.add(sw.Inertia("J", J=1.0), "a")
+        return net
+
+    for number, (one, other) in enumerate(((fan(1), fan(3)), (balls("in turn"), balls("together")))):
+        call: dict[str, Any] = {"t_end": 0.1, "measures": ["end J.omega"], "store": tmp_path / f"{number}.sqlite"}
+        sw.studies.sweep(one, {"J.J": [1.0, 2.0]}, **call)
+        with pytest.raises(sw.ParameterError, match="another sweep, which differs in its network"):
+            sw.studies.sweep(other, {"J.J": [1.0, 2.0]}, **call)
+
+
+def test_a_store_is_that_of_what_a_partial_function_is_given(tmp_path: Path) -> None:
+    def scaled(solution: sw.Solution, factor: float) -> float:
+        return factor * float(solution["J.omega"][-1])
+
+    net = sw.Network("start")
+    net.add(sw.TorqueSource("motor", tau=5.0), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    for factor in (1.0, 2.0):
+        call: dict[str, Any] = {"t_end": 0.1, "measures": {"speed": partial(scaled, factor=factor)}, "processes": 1}
+        if factor == 1.0:
+            sw.studies.sweep(net, {"J.J": [1.0, 2.0]}, store=tmp_path / "store.sqlite", **call)
+            continue
+        with pytest.raises(sw.ParameterError, match="another sweep, which differs in its measures"):
+            sw.studies.sweep(net, {"J.J": [1.0, 2.0]}, store=tmp_path / "store.sqlite", **call)
 
 
 def test_variants_that_are_stored_twice_count_once(tmp_path: Path) -> None:

@@ -114,11 +114,6 @@ class EnsembleEquations:
         self.sides: Array = np.zeros(0)
         """(guards,) on which each guard is met; 0 where it ends none of the modes."""
 
-    @property
-    def watched(self) -> Index:
-        """The guards that end one of the modes."""
-        return np.flatnonzero(self.sides)
-
     def pieces(self, t: Array, p: Array, span: tuple[float, float]) -> Array:
         """(3, k) where lanes at times (k,) begin and stop, and the latest time at which something is evaluated, s.
 

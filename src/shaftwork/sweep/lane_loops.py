@@ -120,7 +120,7 @@ def _top(tables, probe, stack, row, sign, offset, best, near, enough):  # type: 
 
 @inner
 def _first_met(tables, now, probe, stack, lane):  # type: ignore[no-untyped-def]
-    """The guard that is met first in the last step of a lane, and when in s; else Met.NOTHING, or Met.A_LIMIT if unknown."""
+    """The guard that is met first in the last step of a lane, and when in s; Met.NOTHING, or A_LIMIT where unknown."""
     low, high = now[LaneRow.LAST_TIME.value, lane], now[LaneRow.TIME.value, lane]
     met, end = Met.NOTHING.value, high
     for guard in range(tables[LaneNumber.GUARDS.value]):

@@ -85,7 +85,7 @@ def sweep(
         sn: S-N line for measures of damage, or one by quantity.
         rtol: relative tolerance of a step; the absolute one beside it is `rtol` times the size of a state at a speed of
             0.001 rad/s.
-        engine: as in `Model.simulate`.
+        engine: as in `Model.simulate`; one that is named follows each variant by itself.
         initial: start values, or a motion that each variant goes on from, as there.
         steady: whether each variant starts in its own steady state at t = 0, of which `initial` changes some values.
         t_eval: output times of the solutions that functions get, as there; names measure the motion, not the outputs.
@@ -140,9 +140,11 @@ def _errors(task: Task, values: Array, reasons: Sequence[str]) -> dict[str, floa
     """By measure, the largest difference of some variants from double precision, over their largest size."""
     good = np.flatnonzero([not reason for reason in reasons])
     some = good[np.unique(np.linspace(0, good.size - 1, SIDE_BY_SIDE).round().astype(int))] if good.size else good
-    again = Worker(replace(task, precision="")).run(some).values
-    sizes = np.abs(again).max(axis=0, initial=0.0)
-    apart = np.abs(values[some] - again).max(axis=0, initial=0.0)
+    again = Worker(replace(task, precision="")).run(some)
+    both = np.array([not reason for reason in again.reasons], dtype=bool)
+    expected, found = again.values[both], values[some[both]]
+    sizes = np.abs(expected).max(axis=0, initial=0.0)
+    apart = np.abs(found - expected).max(axis=0, initial=0.0)
     return dict(zip(task.measures, (apart / np.where(sizes > 0, sizes, 1.0)).tolist(), strict=True))
 
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 import hashlib
 import json
 import sqlite3
-import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
@@ -19,7 +19,9 @@ import numpy as np
 
 from shaftwork.core.errors import AccuracyWarning, ParameterError
 from shaftwork.core.notices import warn
+from shaftwork.pipeline.network import Network
 from shaftwork.results.measures import Measure
+from shaftwork.sweep.cluster import libraries
 from shaftwork.sweep.sweep_task import Chunk, Reader, Task
 
 TABLES = (
@@ -28,6 +30,10 @@ TABLES = (
     "(number INTEGER PRIMARY KEY, variants BLOB, measured BLOB, reasons TEXT, alone INTEGER, digest TEXT)",
 )
 """What the sweep is, and its chunks: numbers of 64 bits, texts by place in the chunk, see `Chunk`."""
+
+
+LIBRARIES = "libraries"
+"""Under which it is said with which versions the sweep was begun."""
 
 
 class Store:
@@ -81,19 +87,24 @@ class Store:
         if there:
             self._refuse_other(there, title)
         else:
-            self._database.executemany("INSERT INTO sweep VALUES (?, ?)", [*title.items(), ("version", _version())])
+            self._database.executemany("INSERT INTO sweep VALUES (?, ?)", title.items())
         execute("COMMIT")
 
     def _refuse_other(self, there: Mapping[str, str], title: Mapping[str, str]) -> None:
-        if differing := [what for what, value in title.items() if there.get(what) != value]:
+        differing = [what for what, value in title.items() if there.get(what) != value]
+        if others := [what for what in differing if what != LIBRARIES]:
             raise ParameterError(
-                f"store = '{self._path}' holds another sweep, which differs in its {differing[0]}, so its results are "
+                f"store = '{self._path}' holds another sweep, which differs in its {others[0]}, so its results are "
                 "not those of this one. Give another name, or repeat the call that made it."
             )
-        if (before := there.get("version")) != _version():
+        if differing:
+            before, now = (json.loads(text) for text in (there[LIBRARIES], title[LIBRARIES]))
+            changed = [
+                f"{name} {before.get(name)}, and this is {now[name]}" for name in now if now[name] != before.get(name)
+            ]
             raise ParameterError(
-                f"store = '{self._path}' was begun by version {before} of Shaftwork, and this is {_version()}: other "
-                "versions may come to other digits. Give another name."
+                f"store = '{self._path}' was begun with {'; '.join(changed)}: other versions may come to other digits. "
+                "Give another name."
             )
 
     def _read(self, row: Any, task: Task) -> Chunk | None:
@@ -137,6 +148,8 @@ class Store:
         """What SQLite says, in the words of whoever gave the file."""
         try:
             yield
+        except ParameterError:
+            raise
         except (sqlite3.Error, ValueError, TypeError, RecursionError) as error:
             text = str(error)
             if "locked" in text:
@@ -155,12 +168,6 @@ def _digest(variants: bytes, measured: bytes, reasons: str, alone: int) -> str:
     return hashlib.sha256(b"".join((variants, measured, f"{reasons}{alone}".encode()))).hexdigest()
 
 
-def _version() -> str:
-    """Of this library, without an import of the whole of it."""
-    version: str = sys.modules[__name__.partition(".")[0]].__version__
-    return version
-
-
 def _title(task: Task) -> dict[str, str]:
     """What the results of a sweep depend on; long things by their digest."""
     table = hashlib.sha256()
@@ -168,10 +175,9 @@ def _title(task: Task) -> dict[str, str]:
         table.update(name.encode() + np.ascontiguousarray(column).tobytes())
     options = {**task.options, **({"steady": True} if task.steady else {})}
     options |= {"precision on a graphics processor": task.precision} if task.precision else {}
-    parts = "\n".join(repr(placed) for placed in task.network.netlist().placed)
     return {
-        "format": "3",
-        "network": f"{task.network.name} {hashlib.sha256(parts.encode()).hexdigest()}",
+        "format": "4",
+        "network": f"{task.network.name} {_laws(task.network)}",
         "parameters": f"{', '.join(task.columns)} {table.hexdigest()}",
         "measures": _measures(task.measures),
         "S-N lines": repr(dict(task.sn)),
@@ -179,13 +185,30 @@ def _title(task: Task) -> dict[str, str]:
         "options": repr(
             {name: getattr(value, "tolist", lambda value=value: value)() for name, value in options.items()}
         ),
+        LIBRARIES: json.dumps(libraries()),
     }
+
+
+def _laws(network: Network) -> str:
+    """A digest of the parts and of the laws that they come to, those of your own classes and of files as well."""
+    netlist, graph = network.netlist(), network.graph()
+    laws = hashlib.sha256(repr((netlist, graph.parts, graph.branches)).encode())
+    for placed in netlist.placed:
+        for value in placed.part.values.values():
+            if isinstance(path := getattr(value, "path", None), Path):
+                laws.update(path.read_bytes())
+    return laws.hexdigest()
 
 
 def _measures(readers: Mapping[str, Reader]) -> str:
     """Names and what is read; of a function its own name, since no text tells what it does."""
-    named = {
-        name: str(reader) if isinstance(reader, Measure) else getattr(reader, "__qualname__", type(reader).__name__)
-        for name, reader in readers.items()
-    }
-    return repr(named)
+    return repr(
+        {name: str(reader) if isinstance(reader, Measure) else _named(reader) for name, reader in readers.items()}
+    )
+
+
+def _named(function: Any) -> str:
+    """The name of a function, with what a `functools.partial` gives to it."""
+    if isinstance(function, partial):
+        return f"{_named(function.func)} {function.args} {function.keywords}"
+    return str(getattr(function, "__qualname__", type(function).__name__))

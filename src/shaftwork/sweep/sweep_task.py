@@ -156,7 +156,7 @@ class Worker:
         reasons = {
             f"there are fewer than {SIDE_BY_SIDE} variants": len(task) < SIDE_BY_SIDE,
             "a measure is a function of a whole solution": len(read) < len(task.measures),
-            f"engine = '{options['engine']}' was asked for": options["engine"] not in ("auto", "heyoka", "numba"),
+            f"engine = '{options['engine']}' was asked for": options["engine"] != "auto",
             "start values are given": bool(options["initial"]),
             "each variant starts in its own steady state": task.steady,
             "numba is not installed (extra 'fast')": not available("numba"),
@@ -291,10 +291,20 @@ def chunks(worker: Worker, task: Task, variants: Index, processes: int | None) -
         variants: (k,) what is to be done.
         processes: how many; None for as many as there are cores. Variants side by side take to them only where what is
             left takes long enough, others also where so many are asked for.
+
+    Raises:
+        ParameterError: processes are asked for, and a measure cannot be sent to them.
     """
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         sys.exit(1)  # a script without a guard, run again by a process that it has started: the first one says so
-    count = processes if processes is not None else cores() if _can_be_sent(task) else 1
+    sendable, count = _can_be_sent(task), processes or cores()
+    if processes is None and not sendable:
+        count = 1
+    if count > 1 and not sendable:
+        raise ParameterError(
+            f"processes = {count}: other processes do not find a measure that is a lambda, or a function inside "
+            "another or of a notebook. Define it in a module, give the name of a measure, or take processes=1."
+        )
     if processes is not None and count > 1 and worker.why:
         yield from _in_processes(task, parted(variants, worker.chunk), count)
         return

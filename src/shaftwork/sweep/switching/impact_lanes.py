@@ -8,7 +8,8 @@ is left to the event iteration of a single run.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -19,6 +20,7 @@ from sympy import Expr
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.code import vectorised
 from shaftwork.components.branches import INTEGRAL
+from shaftwork.core.errors import CompileError
 from shaftwork.hybrid.hybrid_state import slipping
 from shaftwork.hybrid.impacts.impact_contacts import lasting
 from shaftwork.hybrid.modes.mode_machines import NO_IMPACT, ActiveGuard, GivesWay, limited, with_modes
@@ -136,20 +138,21 @@ class LaneImpact:
             columns: (names, k) of the parameters that vary.
 
         Raises:
-            CompileError: they cannot be followed side by side.
+            CompileError: none of them can be followed side by side.
         """
         hit = self._hit(_Instant(self.equations, columns, group.t, group.x))
         groups, last = list[VariantGroup](), np.zeros(group.lanes.size, dtype=bool)
-        for modes, there in self._ends(hit.back, hit.sure & hit.thrown):
-            flies = hit.back.taken_to(self.equations_of(modes), there)
+        for modes, equations, there in self._ends(hit.back, hit.sure & hit.thrown):
+            flies = hit.back.taken_to(equations, there)
             # a rebound that would lose less than it gains, as it is found late by rounding, is none
             last[there] = (hit.loses[there] > 0) & (hit.loses[there] < 4 * hit.beyond[there] * self._pushed(flies))
             now = flies.moved(hit.late[there])
             new = group.some(there).going_on(modes, now.t, now.x)
             groups.append(new.some(~last[there] & now.follows(flies)))
         rigid = with_modes(self.equations.modes, {self.active.machine: self.active.leave.to})
-        for modes, there in (*self._ends(hit.closed, hit.sure & ~hit.thrown), (rigid, last)):
-            rests = hit.closed.taken_to(self.equations_of(modes), there)
+        resting = self._ends(hit.closed, hit.sure & ~hit.thrown)
+        for modes, equations, there in (*resting, *self._possible([(rigid, last)])):
+            rests = hit.closed.taken_to(equations, there)
             rests.x[rests.equations.kirchhoff.twist(self.active.machine)] = hit.limit[there]
             groups.append(group.some(there).going_on(modes, rests.t, rests.x))
         return groups
@@ -203,7 +206,7 @@ class LaneImpact:
         number = self.active.machine
         return np.asarray(self._slope * (later.across(number) - flies.across(number)) / step)
 
-    def _ends(self, slipping: _Instant, there: Mask) -> Iterator[tuple[ModeNames, Mask]]:
+    def _ends(self, slipping: _Instant, there: Mask) -> Iterator[tuple[ModeNames, GuardedEquations, Mask]]:
         """The modes in which what rubs goes on, and the variants, of those that are marked, that do so."""
         combinations, least = [(slipping.equations.modes, there)], _least(slipping)
         for k, sides in self._rubbing.items():
@@ -213,7 +216,14 @@ class LaneImpact:
             combinations = [
                 (with_modes(modes, {k: name}), of & on) for modes, of in combinations for name, on in options
             ]
-        return ((modes, there) for modes, there in combinations if there.any())
+        return self._possible(combinations)
+
+    def _possible(self, ends: Sequence[tuple[ModeNames, Mask]]) -> Iterator[tuple[ModeNames, GuardedEquations, Mask]]:
+        """Of modes to which variants go those in which they can be followed, with their equations."""
+        for modes, there in ends:
+            if there.any():
+                with suppress(CompileError):
+                    yield modes, self.equations_of(modes), there
 
     def _constant(self, expression: Expr | None, p: Array) -> Array:
         """What is made of the contact's parameters."""
