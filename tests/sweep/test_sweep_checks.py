@@ -185,7 +185,7 @@ def test_a_measure_that_other_processes_do_not_find_is_refused_where_they_are_as
     call: dict[str, Any] = {"t_end": 0.1, "measures": {"speed": lambda solution: float(solution["J.omega"][-1])}}
     net = train(sw.Damper("oil", d=1.0))
     assert not sw.studies.sweep(net, {"J.J": [1.0, 2.0]}, **call).failed.any()
-    with pytest.raises(sw.ParameterError, match="processes = 2: other processes do not find a measure .* lambda"):
+    with pytest.raises(sw.ParameterError, match=r"processes = 2: other processes do not find a measure .* lambda"):
         sw.studies.sweep(net, {"J.J": [1.0, 2.0]}, processes=2, **call)
 
 

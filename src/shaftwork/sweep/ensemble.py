@@ -1,9 +1,10 @@
 """Many variants of one network at once, in lanes of compiled code: the fast way of a sweep.
 
-All variants run through the same phases side by side. Where a lane meets a guard, the mode that this guard leads to is
-taken if the motion in it is beyond doubt: what is stored goes over unchanged, or a rigid contact is hit alone, and
-every guard of the new mode is on its own side or about to be. Of anything else the event iteration of a single run
-tells what follows, for this lane alone. A variant that is stiff, or that comes to no end, is left to `Model.simulate`.
+Each variant has its own times and modes; those in the same modes are followed together. Where one meets a guard, the
+mode that this guard leads to is taken if the motion in it is beyond doubt: what is stored goes over unchanged, or a
+rigid contact is hit alone, and every guard of the new mode is on its own side or about to be. Of anything else the
+event iteration of a single run tells what follows, for this lane alone. A variant that is stiff, or that comes to no
+end, is left to `Model.simulate`.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ class Ensemble:
     Args:
         model: the compiled network.
         names: of the parameters that vary.
-        first: a variant, which says how long phases last and how finely a motion is to be looked at.
+        first: a variant, which gives the nominal sizes of the states and the modes in which all start.
         measures: what is wanted.
         span: start and end, s.
         rtol: relative tolerance.
@@ -283,7 +284,7 @@ class _VariantCourse:
     ) -> LaneCourse:
         """The lanes as they begin."""
         program, count = equations.code.program, group.lanes.size
-        sides, offsets = np.zeros((2, program.guards + program.free, count))
+        sides, offsets = np.zeros((2, program.guards + program.switches, count))
         if len(equations.sides):
             sides[: program.guards], offsets[: program.guards] = equations.sides[:, None], entry.offsets
         begin, ends, highs = pieces

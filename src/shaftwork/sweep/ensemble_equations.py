@@ -81,7 +81,7 @@ class PhaseEntry:
     """Where variants enter a phase.
 
     Args:
-        met: (k,) the guard that alone contradicts its modes; else NOTHING where none does, or A_LIMIT.
+        met: (k,) the guard that alone contradicts its modes; NOTHING where none does, GIVEN_UP where several do.
         offsets: (guards, k) how far beyond zero each guard has to go.
     """
 

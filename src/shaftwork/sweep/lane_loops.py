@@ -50,7 +50,7 @@ def _probe(tables, probe, t):  # type: ignore[no-untyped-def]
     for row in range(tables[LaneNumber.MOVING.value]):
         _fill(probe, tables[LaneRow.Y.value] + row, probe[tables[LaneRow.NEW.value] + row, 0])
     _fill(probe, LaneRow.MOMENT.value, min(t, probe[LaneRow.HIGH.value, 0]))
-    run_at(tables[LaneNumber.JETS.value], probe, tables[LaneRow.SIGHT.value])
+    run_at(tables[LaneNumber.JETS.value], probe, tables[LaneRow.MONITORED.value])
 
 
 @inner
@@ -120,15 +120,15 @@ def _top(tables, probe, stack, row, sign, offset, best, near, enough):  # type: 
 
 @inner
 def _first_met(tables, now, probe, stack, lane):  # type: ignore[no-untyped-def]
-    """The guard that is met first in the last step of a lane, and when in s; Met.NOTHING, or A_LIMIT where unknown."""
+    """The guard that is met first in the last step of a lane, and when in s; Met.NOTHING, or GIVEN_UP where unknown."""
     low, high = now[LaneRow.LAST_TIME.value, lane], now[LaneRow.TIME.value, lane]
     met, end = Met.NOTHING.value, high
     for guard in range(tables[LaneNumber.GUARDS.value]):
         side = now[tables[LaneRow.SIDES.value] + guard, lane]
         offset = now[tables[LaneRow.OFFSETS.value] + guard, lane]
         number = JET * (tables[LaneNumber.EXTREMES.value] + guard)
-        row = tables[LaneRow.SIGHT.value] + number
-        left = _jet(now, tables[LaneRow.LAST_SIGHT.value] + number, side, offset, lane)
+        row = tables[LaneRow.MONITORED.value] + number
+        left = _jet(now, tables[LaneRow.LAST_MONITORED.value] + number, side, offset, lane)
         right = _jet(now, row, side, offset, lane)
         inside, beyond = reach(high - low, left, right)
         if side == 0.0 or (right[0] <= 0 and inside + beyond <= 0):
@@ -139,7 +139,7 @@ def _first_met(tables, now, probe, stack, lane):  # type: ignore[no-untyped-def]
             near = TYPED * max(abs(left[0]), abs(right[0]))
             value, upper = _top(tables, probe, stack, row, side, offset, 0.0, near, 0.0)
         if np.isnan(value):
-            return Met.A_LIMIT.value, end
+            return Met.GIVEN_UP.value, end
         if value <= 0:
             continue
         share = (upper - low) / (high - low)
@@ -172,8 +172,8 @@ def _measure(tables, now, probe, stack, seen, lane, end):  # type: ignore[no-unt
     """
     known, low = True, now[LaneRow.LAST_TIME.value, lane]
     for k in range(tables[LaneNumber.EXTREMES.value]):
-        sign, row = now[tables[LaneRow.SIGNS.value] + k, lane], tables[LaneRow.SIGHT.value] + JET * k
-        left = _jet(now, tables[LaneRow.LAST_SIGHT.value] + JET * k, sign, 0.0, lane)
+        sign, row = now[tables[LaneRow.SIGNS.value] + k, lane], tables[LaneRow.MONITORED.value] + JET * k
+        left = _jet(now, tables[LaneRow.LAST_MONITORED.value] + JET * k, sign, 0.0, lane)
         right = _jet(seen, row, sign, 0.0, lane)
         best = max(now[tables[LaneRow.BEST.value] + k, lane], left[0], right[0])
         lowest = min(now[tables[LaneRow.LOWS.value] + k, lane], left[0], right[0])
@@ -209,8 +209,8 @@ def _begin(tables, now, lane):  # type: ignore[no-untyped-def]
             step = min(step, 0.01 * (now[tables[LaneRow.NOMINAL.value] + row, lane] + abs(x)) / abs(rate))
     now[LaneRow.STEP.value, lane] = max(step, now[LaneRow.STEP.value, lane])
     guards = tables[LaneNumber.GUARDS.value]
-    for guard in range(guards - tables[LaneNumber.FREE.value], guards):
-        side, row = 0.0, tables[LaneRow.SIGHT.value] + JET * (tables[LaneNumber.EXTREMES.value] + guard)
+    for guard in range(guards - tables[LaneNumber.SWITCHES.value], guards):
+        side, row = 0.0, tables[LaneRow.MONITORED.value] + JET * (tables[LaneNumber.EXTREMES.value] + guard)
         for k in range(JET - 1, -1, -1):
             if now[row + k, lane] != 0.0:
                 side = -np.sign(now[row + k, lane])
@@ -222,19 +222,19 @@ def _arrived(tables, course, now, probe, there, stack, lane):  # type: ignore[no
     """Whether a lane is done: it has met a guard in its last step, is at its end, or what it has met is unknown."""
     met, end, last = Met.NOTHING.value, now[LaneRow.TIME.value, lane], now[LaneRow.END.value, lane]
     seen, x, guards = now, tables[LaneRow.X.value], tables[LaneNumber.GUARDS.value]
-    if now[LaneRow.CLOSE.value, lane] > 0:
+    if now[LaneRow.INSPECTED.value, lane] > 0:
         _repeat(tables, now, probe, lane)
         met, end = _first_met(tables, now, probe, stack, lane)
         if met >= 0:
             _probe(tables, probe, end)
-            if met >= guards - tables[LaneNumber.FREE.value]:
+            if met >= guards - tables[LaneNumber.SWITCHES.value]:
                 end = _past(tables, probe, last)
                 _probe(tables, probe, end)
             for row in range(tables[LaneRow.HEIGHT.value]):
                 there[row, lane] = probe[row, lane]
             seen, x = there, tables[LaneRow.NEW.value]
-        if met == Met.A_LIMIT.value or not _measure(tables, now, probe, stack, seen, lane, end):
-            return True  # as it was loaded, A_LIMIT
+        if met == Met.GIVEN_UP.value or not _measure(tables, now, probe, stack, seen, lane, end):
+            return True  # as it was loaded, GIVEN_UP
     if met == Met.NOTHING.value and end >= last:
         met = Met.THE_END.value
     if met != Met.NOTHING.value:
@@ -273,7 +273,9 @@ def follow(tables, course, now, probe, there, stack, end):  # type: ignore[no-un
         busy, loaded = False, False
         for lane in range(LANES):
             on = now[LaneRow.VARIANT.value, lane] >= 0
-            to_see = now[LaneRow.CLOSE.value, lane] > 0 or now[LaneRow.TIME.value, lane] >= now[LaneRow.END.value, lane]
+            to_see = (
+                now[LaneRow.INSPECTED.value, lane] > 0 or now[LaneRow.TIME.value, lane] >= now[LaneRow.END.value, lane]
+            )
             if now[LaneRow.MOVED.value, lane] > 0 and to_see:
                 on = not _arrived(tables, course, now, probe, there, stack, lane) and on
             on = on and not _hopeless(now, lane, end)

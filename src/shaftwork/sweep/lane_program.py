@@ -23,7 +23,7 @@ from shaftwork.numerics.lane_functions import LANES
 from shaftwork.numerics.machine_code import LaneBody, lane_function
 from shaftwork.results.measures import EXTREMES, POWERS
 from shaftwork.sweep.lane_loops import follow
-from shaftwork.sweep.lane_step import STAGES, Judged, StepWriter
+from shaftwork.sweep.lane_step import STAGES, ControlledQuantity, StepWriter
 from shaftwork.sweep.lane_tables import LaneCourse, LaneEnd, LaneRow, Met
 
 OF_A_STEP, LOOSEST_TOLERANCE, TIGHTEST_TOLERANCE = 0.1, 1e-7, 1e-13
@@ -53,14 +53,14 @@ class LaneProgram:
         stored: Sequence[Expr],
     ) -> None:
         self._parts = {"rates": rows.rates, "guards": tuple(guards), "shown": tuple(quantities), "stored": stored}
-        seen = Seen(rows, guards, quantities, kinds)
+        seen = MonitoredQuantities(rows, guards, quantities, kinds)
         points = [one for part in self._parts.values() for one in part]
-        expressions = (*seen.slopes, *seen.motion.definitions.values(), *seen.sight, *points)
+        expressions = (*seen.slopes, *seen.motion.definitions.values(), *seen.monitored, *points)
         self._fixed = Fixed(rows.parameters, (*rows.states, TIME, *seen.motion.definitions), expressions)
         self._places = {x: ("y", k) for k, x in enumerate(rows.states)}
         self._places |= {symbol: ("p", k) for k, symbol in enumerate(rows.parameters)}
         self._places |= {part: ("p", len(rows.parameters) + k) for part, k in self._fixed.places.items()}
-        self.guards, self.free = len(guards), len(seen.jumps)
+        self.guards, self.switches = len(guards), len(seen.jumps)
         """How many guards there are, and how many switches of laws behind them."""
         self.integrated = [k for k, kind in enumerate(kinds) if kind in POWERS]
         """Which measures are integrals."""
@@ -72,18 +72,18 @@ class LaneProgram:
         except NumbaError as error:
             raise CompileError(f"A law has no machine code: {error}") from error
 
-    def _compile(self, seen: Seen) -> None:
+    def _compile(self, seen: MonitoredQuantities) -> None:
         """Compile what follows a motion."""
         place = self._place
         write = partial(lane_function, rows={row.name.lower(): int(place[row]) for row in LaneRow})
         rates = write(partial(self._write, values=seen.slopes, definitions={}))
-        jets = write(partial(self._write, values=seen.sight, definitions=seen.motion.definitions))
-        slopes, sight = (rates.address, int(place[LaneRow.SLOPES])), (jets.address, int(place[LaneRow.SIGHT]))
-        steps = seen.steps(slopes, sight)
+        jets = write(partial(self._write, values=seen.monitored, definitions=seen.motion.definitions))
+        slopes, monitored = (rates.address, int(place[LaneRow.SLOPES])), (jets.address, int(place[LaneRow.MONITORED]))
+        steps = seen.steps(slopes, monitored)
         probe = write(steps.probe)
         advance = write(partial(steps.advance, probe=probe.address))
         self._code = rates, jets, probe, advance, write(steps.look)
-        counts = seen.states, seen.moving, len(seen.signs), self.guards + self.free, self.free
+        counts = seen.states, seen.moving, len(seen.signs), self.guards + self.switches, self.switches
         self._tables = np.array([*place, *(code.address for code in self._code[1:]), *counts])
 
     def _write(self, body: LaneBody, values: Sequence[Expr], definitions: Mapping[Dummy, Expr]) -> None:
@@ -124,7 +124,7 @@ class LaneProgram:
         """What is loaded of each variant, in columns."""
         rows, measures = np.zeros((self._place[LaneRow.Y], course.t.size)), [measure for measure, _ in self._signs]
         rows[LaneRow.TOLERANCE] = step_tolerance(rtol)
-        rows[LaneRow.LONGEST], rows[LaneRow.ACTIVE], rows[LaneRow.MET] = (span[1] - span[0]) / 50, 1.0, Met.A_LIMIT
+        rows[LaneRow.LONGEST], rows[LaneRow.ACTIVE], rows[LaneRow.MET] = (span[1] - span[0]) / 50, 1.0, Met.GIVEN_UP
         values: dict[LaneRow, Any] = {
             LaneRow.VARIANT: range(course.t.size),
             LaneRow.TIME: course.t,
@@ -165,8 +165,8 @@ class LaneProgram:
         return dict(zip(self._parts, np.split(values, np.cumsum(counts)[:-1]), strict=True))
 
 
-class Seen:
-    """What is seen of a motion, and what of it is judged.
+class MonitoredQuantities:
+    """What is watched in a motion, and which quantities control the step by their error.
 
     Args:
         rows, guards, quantities, kinds: as for `LaneProgram`.
@@ -180,22 +180,25 @@ class Seen:
         self._watched, self.states = len(seen) - len(self.signs), len(rows.states)
         integrated = [(quantities[k], POWERS[kind]) for k, kind in enumerate(kinds) if kind in POWERS]
         self.moving = self.states + len(integrated)
-        blind = [one for one in dict.fromkeys(seen) if one.has(TIME)]
-        self.slopes = (*rows.rates, *(quantity**power for quantity, power in integrated), *blind)
-        self.motion, judged = _Derivatives(rows), dict[Expr, Judged]()
-        self.sight = [derivative for one in seen for derivative in self.motion.jet(one)]
-        for quantity in dict.fromkeys((*quantities, *blind)):
+        timed = [one for one in dict.fromkeys(seen) if one.has(TIME)]
+        self.slopes = (*rows.rates, *(quantity**power for quantity, power in integrated), *timed)
+        self.motion, controlled = _Derivatives(rows), dict[Expr, ControlledQuantity]()
+        self.monitored = [derivative for one in seen for derivative in self.motion.jet(one)]
+        for quantity in dict.fromkeys((*quantities, *timed)):
             columns = tuple(k for k, x in enumerate(rows.states) if x in quantity.free_symbols)
-            row = self.moving + blind.index(quantity) if quantity in blind else None
-            judged[quantity] = Judged(len(self.sight), columns, quantity in quantities, row)
-            self.sight += [quantity, *(slope(quantity, rows.states[k]) for k in columns)]
-        self._judged, self._integrals = judged, [(judged[quantity], power) for quantity, power in integrated]
+            row = self.moving + timed.index(quantity) if quantity in timed else None
+            controlled[quantity] = ControlledQuantity(len(self.monitored), columns, quantity in quantities, row)
+            self.monitored += [quantity, *(slope(quantity, rows.states[k]) for k in columns)]
+        self._integrals = [(controlled[quantity], power) for quantity, power in integrated]
+        self._controlled = controlled
 
-    def steps(self, slopes: tuple[Any, int], sight: tuple[Any, int], kind: type[StepWriter] = StepWriter) -> StepWriter:
-        """What makes steps, with what writes slopes and sight, and their first rows."""
+    def steps(
+        self, slopes: tuple[Any, int], monitored: tuple[Any, int], kind: type[StepWriter] = StepWriter
+    ) -> StepWriter:
+        """What makes steps, with what writes slopes and monitored values, and their first rows."""
         signs = [sign for _, sign in self.signs]
         return kind(
-            slopes, sight, len(self.slopes), self.states, self._integrals, [*self._judged.values()], signs,
+            slopes, monitored, len(self.slopes), self.states, self._integrals, [*self._controlled.values()], signs,
             self._watched,
         )  # fmt: skip
 
@@ -206,7 +209,7 @@ class Seen:
         )  # fmt: skip
         sizes = {"nominal": states, "x": moving, "y": moving, "new": moving, "last_x": moving}
         sizes |= {"slopes": STAGES * slopes, "fifth": slopes, "third": slopes, "fifths": states, "thirds": states}
-        sizes |= {"sight": len(self.sight), "last_sight": JET * (extremes + watched), "best": extremes}
+        sizes |= {"monitored": len(self.monitored), "last_monitored": JET * (extremes + watched), "best": extremes}
         sizes |= {"lows": extremes, "signs": extremes, "sides": watched, "offsets": watched, "p": parameters}
         return np.cumsum([0, *(sizes.get(row.name.lower(), 1) for row in LaneRow if row is not LaneRow.HEIGHT)])
 

@@ -23,25 +23,25 @@ OF_A_QUANTITY, CANCELLED = 10.0, 1e-4
 """What is measured may be wrong by so many times as much as a state, and by the error of so small a part of what it is
 the difference of: of a stiff damper's torque more would be lost in rounding."""
 TINY = 1e-30
-"""Beside an error."""
+"""Keeps a division by an error or a size of zero finite; beside squares of what is measured in SI."""
 STAGES = len(DOP853.B)
 
 
 @dataclass(frozen=True)
-class Judged:
+class ControlledQuantity:
     """A quantity whose error counts.
 
     Args:
-        row: of its value in the sight; its gradient follows.
+        row: of its value among the monitored ones; its gradient follows.
         columns: the states by which it is derived.
         measured: whether its own error counts.
-        blind: of what may change without the states, the row of its slope; else None.
+        time_slope: of what depends on time itself, the row of its slope by time; else None.
     """
 
     row: int
     columns: tuple[int, ...]
     measured: bool
-    blind: int | None
+    time_slope: int | None
 
 
 class StepWriter:
@@ -53,29 +53,29 @@ class StepWriter:
     Args:
         slopes: what writes the slopes at y and the moment, its address, and the row of the first ones; those of all
             stages are behind each other.
-        sight: what writes what is seen there, its address, and its first row.
+        monitored: what writes what is seen there, its address, and its first row.
         count: of slopes.
         states: how many there are; the integrals follow them, as quantities and powers.
-        integrals: which of the judged quantities is integrated, and to which power.
-        judged: quantities.
-        signs: of each quantity whose largest value is wanted; jets of these come first in the sight,
+        integrals: which of the controlled quantities is integrated, and to which power.
+        controlled: quantities.
+        signs: of each quantity whose largest value is wanted; jets of these come first among the monitored values,
         guards: and then those of so many guards.
     """
 
     def __init__(
         self,
         slopes: tuple[Any, int],
-        sight: tuple[Any, int],
+        monitored: tuple[Any, int],
         count: int,
         states: int,
-        integrals: Sequence[tuple[Judged, int]],
-        judged: Sequence[Judged],
+        integrals: Sequence[tuple[ControlledQuantity, int]],
+        controlled: Sequence[ControlledQuantity],
         signs: Sequence[float],
         guards: int,
     ) -> None:
-        (self._slopes, self._first), self._sight = slopes, sight
+        (self._slopes, self._first), self._monitored = slopes, monitored
         self._count, self._states = count, states
-        self._integrals, self._judged = integrals, judged
+        self._integrals, self._controlled = integrals, controlled
         self._signs, self._guards = signs, guards
 
     def probe(self, body: LaneBody) -> None:
@@ -108,7 +108,7 @@ class StepWriter:
         body.put("time", 0, build.select(good, arrived, time))
         self._where(good, "last_x", "x", self._moving)
         self._where(good, "x", "new", self._moving)
-        self._where(good, "last_sight", "sight", self._jets)
+        self._where(good, "last_monitored", "monitored", self._jets)
         body.put("moved", 0, build.select(good, one, zero))
         body.put("made", 0, self._sum([body.read("made", 0), one]))
         root = self._sum([error, body.number(TINY)])
@@ -125,7 +125,7 @@ class StepWriter:
         with body.loop(0, self._moving) as row:
             body.put("y", 0, body.read("x", 0, row), row)
         body.put("moment", 0, body.intrinsic("minnum", body.read("time", 0), body.read("high", 0)))
-        body.run(*self._sight)
+        body.run(*self._monitored)
         body.run(self._slopes, self._first)
         self.compare(body)
 
@@ -134,27 +134,27 @@ class StepWriter:
         self._begin(body)
         build, zero = body.builder, body.number(0.0)
         self._size = self._difference(body.read("time", 0), body.read("last_time", 0))
-        moved, close = build.fcmp_ordered(">", body.read("moved", 0), zero), body.bit(value=False)
+        moved, inspected = build.fcmp_ordered(">", body.read("moved", 0), zero), body.bit(value=False)
         for guard in range(self._guards):
             side, offset = body.read("sides", guard), body.read("offsets", guard)
-            left, right = (self._jet(name, len(self._signs) + guard, side) for name in ("last_sight", "sight"))
+            left, right = (self._jet(name, len(self._signs) + guard, side) for name in ("last_monitored", "monitored"))
             left[0], right[0] = self._difference(left[0], offset), self._difference(right[0], offset)
             above = build.fcmp_ordered(">", right[0], zero)
             reaches = build.not_(build.fcmp_ordered("<=", self._sum(self._reach(left, right)), zero))  # NaN as well
             watched = build.fcmp_ordered("!=", side, zero)
-            close = build.or_(close, build.and_(watched, build.or_(above, reaches)))
+            inspected = build.or_(inspected, build.and_(watched, build.or_(above, reaches)))
         for k, sign in enumerate(self._signs):
-            left, right = (self._jet(name, k, body.number(sign)) for name in ("last_sight", "sight"))
+            left, right = (self._jet(name, k, body.number(sign)) for name in ("last_monitored", "monitored"))
             higher, lower = (body.intrinsic(name, left[0], right[0]) for name in ("maxnum", "minnum"))
-            calm, best, low = build.and_(moved, build.not_(close)), body.read("best", k), body.read("lows", k)
+            calm, best, low = build.and_(moved, build.not_(inspected)), body.read("best", k), body.read("lows", k)
             best = build.select(calm, body.intrinsic("maxnum", best, higher), best)
             body.put("best", k, best)
             body.put("lows", k, build.select(calm, body.intrinsic("minnum", low, lower), low))
             inside, beyond = self._reach(left, right)
             rises = build.fcmp_ordered(">", inside, higher)
             rises = build.and_(rises, build.fcmp_ordered(">", self._sum([inside, beyond]), best))
-            close = build.or_(close, rises)
-        body.put("close", 0, build.select(build.and_(moved, close), body.number(1.0), zero))
+            inspected = build.or_(inspected, rises)
+        body.put("inspected", 0, build.select(build.and_(moved, inspected), body.number(1.0), zero))
 
     def _begin(self, body: LaneBody) -> None:
         self._body = body
@@ -231,7 +231,7 @@ class StepWriter:
         return build.fdiv(self._product(self._size, fifth), scale)
 
     def _of_slopes(self) -> list[tuple[Any, tuple[Any, Any]]]:
-        """What is allowed and missed of integrals, and of what is blind."""
+        """What is allowed and missed of integrals, and of what depends on time itself."""
         body, square, parts = self._body, self._product(self._size, self._size), []
         for k, (quantity, power) in enumerate(self._integrals):
             row = self._states + k
@@ -239,9 +239,9 @@ class StepWriter:
             beside = self._sum([self._mean(row), self._product(*[least] * power)])
             allowed = self._sum([self._squares([body.read("x", row)]), self._product(square, beside)])
             parts.append((allowed, (body.read("fifth", row), body.read("third", row))))
-        for quantity in self._judged:
-            if quantity.blind is not None:
-                row = quantity.blind
+        for quantity in self._controlled:
+            if quantity.time_slope is not None:
+                row = quantity.time_slope
                 beside = self._sum([self._mean(row), self._least(quantity)])
                 allowed = self._product(body.number(OF_A_QUANTITY**2), square, beside)
                 parts.append((allowed, (body.read("fifth", row), body.read("third", row))))
@@ -250,11 +250,11 @@ class StepWriter:
     def _of_measured(self) -> list[tuple[Any, tuple[Any, Any]]]:
         """What is allowed and missed of quantities that are measured."""
         body, parts = self._body, []
-        for quantity in self._judged:
+        for quantity in self._controlled:
             if not quantity.measured:
                 continue
             change = self._product(self._size, self._along(quantity, "slopes"))
-            beside = self._sum([self._squares([body.read("sight", quantity.row), change]), self._least(quantity)])
+            beside = self._sum([self._squares([body.read("monitored", quantity.row), change]), self._least(quantity)])
             missed = self._along(quantity, "fifth"), self._along(quantity, "third")
             parts.append((self._product(body.number(OF_A_QUANTITY**2), beside), missed))
         return parts
@@ -264,21 +264,21 @@ class StepWriter:
         slopes = [self._body.read("slopes", stage * self._count + row) for stage in range(STAGES)]
         return self._product(self._body.number(1 / STAGES), self._squares(slopes))
 
-    def _least(self, quantity: Judged) -> Any:
+    def _least(self, quantity: ControlledQuantity) -> Any:
         """The square of what matters of a quantity whatever its value."""
         body, parts = self._body, []
         for place, column in enumerate(quantity.columns):
-            slope, x = body.read("sight", quantity.row + 1 + place), body.read("x", column)
+            slope, x = body.read("monitored", quantity.row + 1 + place), body.read("x", column)
             parts += [self._product(slope, body.read("nominal", column))]
             parts += [self._product(slope, x, body.number(CANCELLED))]
         return self._sum([self._squares(parts), body.number(TINY)])
 
-    def _along(self, quantity: Judged, name: str) -> Any:
+    def _along(self, quantity: ControlledQuantity, name: str) -> Any:
         """The change of a quantity with changes of the states, the first rows of an array."""
         read = self._body.read
         places = enumerate(quantity.columns)
         return self._sum(
-            [self._product(read("sight", quantity.row + 1 + k), read(name, column)) for k, column in places]
+            [self._product(read("monitored", quantity.row + 1 + k), read(name, column)) for k, column in places]
         )
 
     def _squares(self, parts: Sequence[Any]) -> Any:

@@ -13,7 +13,7 @@ class Met(IntEnum):
 
     NOTHING = -1
     THE_END = -2
-    A_LIMIT = -3
+    GIVEN_UP = -3
 
 
 class LaneRow(IntEnum):
@@ -33,7 +33,7 @@ class LaneRow(IntEnum):
     HIGH = 4
     """The latest time at which anything is evaluated, s."""
     MOMENT = 5
-    """Time at which slopes and sights are, s."""
+    """Time at which slopes and monitored values are, s."""
     END = 6
     """Up to which a lane goes, s."""
     STEP = 7
@@ -42,8 +42,8 @@ class LaneRow(IntEnum):
     """1 where a lane is on its way."""
     MOVED = 9
     """1 where its last step was good."""
-    CLOSE = 10
-    """1 where more than the ends of that is to be looked at."""
+    INSPECTED = 10
+    """1 where the inside of that has to be looked at."""
     MADE = 11
     """How many steps were tried."""
     LAST_TIME = 12
@@ -61,7 +61,7 @@ class LaneRow(IntEnum):
     BEST = 18
     """Largest values so far, of extremes."""
     LOWS = 19
-    """And the lowest."""
+    """Lowest values so far, of extremes."""
     SIGNS = 20
     """Of extremes: times which a quantity is the largest."""
     SIDES = 21
@@ -77,7 +77,7 @@ class LaneRow(IntEnum):
     LAST_X = 26
     """The same at the start of the last good step."""
     SLOPES = 27
-    """Of states, integrals and what is blind, stage by stage."""
+    """Of states, integrals and what depends on time itself, stage by stage."""
     FIFTH = 28
     """What a method of order 5 misses of all slopes."""
     THIRD = 29
@@ -86,9 +86,9 @@ class LaneRow(IntEnum):
     """Squares of that over what is allowed, of the states."""
     THIRDS = 31
     """The same by order 3."""
-    SIGHT = 32
-    """Jets of what is seen, and values and gradients of what is judged."""
-    LAST_SIGHT = 33
+    MONITORED = 32
+    """Jets of what is watched, and values and gradients of what controls the step by its error."""
+    LAST_MONITORED = 33
     """Jets at the start of the last good step."""
     HEIGHT = 34
     """Behind all of them."""
@@ -106,15 +106,15 @@ class LaneNumber(IntEnum):
     LOOK = LaneRow.HEIGHT + 4
     """Of what writes the first slopes and what is seen at the start of a step, and looks at the last one."""
     STATES = LaneRow.HEIGHT + 5
-    """How many; integrals follow them,"""
+    """Number of states."""
     MOVING = LaneRow.HEIGHT + 6
-    """and so many are both."""
+    """Number of states and integrals; integrals stand behind states."""
     EXTREMES = LaneRow.HEIGHT + 7
-    """How many; what they are of is seen first."""
+    """Number of extremes; their quantities are the first monitored values."""
     GUARDS = LaneRow.HEIGHT + 8
-    """How many of those seen behind them are guards and switches."""
-    FREE = LaneRow.HEIGHT + 9
-    """How many of these are switches of laws; they come last."""
+    """Number of guards and switches, the monitored values behind those."""
+    SWITCHES = LaneRow.HEIGHT + 9
+    """Number of switches of laws, the last of these."""
 
 
 class LaneCourse(NamedTuple):
@@ -149,7 +149,7 @@ class LaneEnd(NamedTuple):
     Args:
         t, x, best, steps: as in `LaneCourse`.
         integrals: (integrals, k).
-        met: (k,) guards, THE_END or A_LIMIT.
+        met: (k,) guards, THE_END or GIVEN_UP.
     """
 
     t: Array

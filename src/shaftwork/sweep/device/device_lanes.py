@@ -17,7 +17,7 @@ from shaftwork.formulation.explicit_rows import Rows
 from shaftwork.numerics.traced_code import rows_of
 from shaftwork.sweep.device.inner_search import DEPTH, INTERVAL
 from shaftwork.sweep.device.lock_step import LaneTask, LockStep, TracedStep
-from shaftwork.sweep.lane_program import LaneProgram, Seen, step_tolerance
+from shaftwork.sweep.lane_program import LaneProgram, MonitoredQuantities, step_tolerance
 from shaftwork.sweep.lane_tables import LaneCourse, LaneEnd, LaneRow
 
 SINGLE_ROUNDINGS = 32
@@ -96,15 +96,15 @@ class DeviceProgram(LaneProgram):
         self._device, self._kind = device.device, np.float32 if device.precision == "single" else np.float64
         super().__init__(rows, guards, quantities, kinds, stored)
 
-    def _compile(self, seen: Seen) -> None:
+    def _compile(self, seen: MonitoredQuantities) -> None:
         import jax
 
         rates = partial(self._write, values=seen.slopes, definitions={})
-        jets = partial(self._write, values=seen.sight, definitions=seen.motion.definitions)
+        jets = partial(self._write, values=seen.monitored, definitions=seen.motion.definitions)
         writer = seen.steps((lambda memory: rows_of(jax, memory, rates), 0), (None, 0), TracedStep)
         sizes = dict(zip((row.name.lower() for row in LaneRow), np.diff(self._place).tolist(), strict=False))
-        self._steps = LockStep(jax, writer, jets, sizes, [sign for _, sign in seen.signs], self.free)
-        numbers = 2 * sum(sizes.values()) + INTERVAL * (len(seen.signs) + self.guards + self.free + DEPTH)
+        self._steps = LockStep(jax, writer, jets, sizes, [sign for _, sign in seen.signs], self.switches)
+        numbers = 2 * sum(sizes.values()) + INTERVAL * (len(seen.signs) + self.guards + self.switches + DEPTH)
         most = 256 if self._device.platform == "cpu" else MOST_LANES
         # always as many, whatever the number of variants: the digits of one do not depend on those beside it
         self._lanes_at_once = min(most, 2 ** int(np.log2(MEMORY / (8 * numbers))))

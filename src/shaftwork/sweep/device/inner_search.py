@@ -54,7 +54,7 @@ class InnerSearch:
         }
 
     def jets(self, memory: dict[str, Any], name: str) -> Any:
-        """(3, watched, lanes) all that is watched with its derivatives, on its side and less its offset, in a sight."""
+        """(3, watched, lanes) jets of all that is watched in an array, on its side and less its offset."""
         numpy, lanes = self._numpy, memory["depth"].size
         signs = numpy.concatenate([numpy.repeat(self._signs[:, None], lanes, axis=1), memory["sides"]])
         jets = signs * memory[name][: JET * self.watched].reshape(self.watched, JET, lanes).swapaxes(0, 1)
@@ -67,26 +67,26 @@ class InnerSearch:
     def _at(self, rows: Any, number: Any) -> Any:
         return self._numpy.take_along_axis(rows, number[None], 0)[0]
 
-    def open(self, memory: dict[str, Any], close: Any, ready: Any) -> Any:
+    def open(self, memory: dict[str, Any], inspected: Any, ready: Any) -> Any:
         """Let last steps be searched, for guards if there are any, and for peaks where no guard may be met.
 
         Args:
             memory: of the lanes; `uppers` is when each guard was seen exceeded.
-            close: (lanes,) whose last step is to be searched.
+            inspected: (lanes,) whose last step is to be searched.
             ready: (lanes,) whose peaks are to be searched.
 
         Returns:
             (lanes,) whose peaks are.
         """
         numpy, first = self._numpy, self.extremes
-        left, right = (self.jets(memory, name) for name in ("last_sight", "sight"))
+        left, right = (self.jets(memory, name) for name in ("last_monitored", "monitored"))
         inside, beyond = self._reach(memory["time"] - memory["last_time"], left, right)
-        watched, above = close & (memory["sides"] != 0.0), right[0, first:] > 0
+        watched, above = inspected & (memory["sides"] != 0.0), right[0, first:] > 0
         memory["lost"] = memory["lost"] | numpy.any(watched & numpy.isnan(right[0, first:]), axis=0)
         uppers = numpy.where(watched & above, memory["time"], np.inf)
-        memory["uppers"] = numpy.where(close, uppers, memory["uppers"])
+        memory["uppers"] = numpy.where(inspected, uppers, memory["uppers"])
         perhaps = watched & ~above & ((inside + beyond)[first:] > 0)
-        ready |= close & ~numpy.any(perhaps | (watched & above), axis=0)
+        ready |= inspected & ~numpy.any(perhaps | (watched & above), axis=0)
         for name, extreme in (("best", numpy.maximum), ("lows", numpy.minimum)):
             value = extreme(memory[name], extreme(left[0, :first], right[0, :first]).astype(memory[name].dtype))
             memory[name] = numpy.where(ready, value, memory[name])
@@ -95,7 +95,7 @@ class InnerSearch:
         beside = TYPED * numpy.maximum(abs(left[0]), abs(right[0]))[first:]
         on = numpy.concatenate([numpy.broadcast_to(ready, best.shape), perhaps])
         memory["near"] = numpy.where(on, numpy.concatenate([near, beside]), memory["near"])
-        memory["looks"] = numpy.where(close | ready, 0, memory["looks"])
+        memory["looks"] = numpy.where(inspected | ready, 0, memory["looks"])
         low, high = (numpy.broadcast_to(memory[name], on.shape)[None] for name in ("last_time", "time"))
         rest = numpy.zeros((3, *on.shape)).at[2].set(np.arange(self.watched)[:, None])
         self._push(memory, on, numpy.concatenate([low, left, high, right, rest]))

@@ -91,7 +91,7 @@ class LockStep:
         jets: writes what is seen.
         sizes: rows of each array of `LaneRow`, by its name in small letters.
         signs: of extremes.
-        free: how many of the guards are switches of laws.
+        switches: how many of the guards are switches of laws.
     """
 
     def __init__(
@@ -101,22 +101,22 @@ class LockStep:
         jets: Callable[[TracedBody], None],
         sizes: Mapping[str, int],
         signs: list[float],
-        free: int,
+        switches: int,
     ) -> None:
         self._jax, self._numpy, self._writer, self._jets, self._sizes = jax, jax.numpy, writer, jets, sizes
-        self._guards, self._free = sizes["sides"] - free, free
+        self._guards, self._switches = sizes["sides"] - switches, switches
         self._search = InnerSearch(jax, signs, sizes["sides"], writer.reach)
         self.course = jax.jit(self._course)
 
     def begun(self, lanes: int, kind: Any) -> dict[str, Any]:
         """The memory of so many lanes, with numbers of a kind; times, parameters and what is told are always double."""
-        states = ("nominal", "x", "last_x", "sight", "last_sight", "best", "lows")
+        states = ("nominal", "x", "last_x", "monitored", "last_monitored", "best", "lows")
         kept = {name: rows for name, rows in self._sizes.items() if name not in SCRATCH}
         arrays = {name: np.zeros((rows, lanes), dtype=kind if name in states else float) for name, rows in kept.items()}
         arrays["lows"][:] = np.inf
         mode = {
             "mode": np.full(lanes, LaneTask.DONE, dtype=np.int32),
-            "met": np.full(lanes, Met.A_LIMIT, dtype=np.int32),
+            "met": np.full(lanes, Met.GIVEN_UP, dtype=np.int32),
         }
         times = {name: np.zeros(lanes) for name in ("goal", "far", "before", "behind", "crossed")}
         rise = {"guard": np.zeros(lanes, dtype=np.int32)}
@@ -140,7 +140,7 @@ class LockStep:
         there = {"y": numpy.where(going, memory["x"], memory["new"])}
         there["moment"] = numpy.minimum(numpy.where(going, memory["time"], memory["goal"]), memory["high"])
         memory["seen"] = rows_of(self._jax, memory | there, self._jets)
-        memory["sight"] = numpy.where(going | starting, memory["seen"], memory["sight"])
+        memory["monitored"] = numpy.where(going | starting, memory["seen"], memory["monitored"])
         self._begin(memory, starting)
         self._writer.compare(TracedBody(self._jax, memory))
         self._turn(memory)
@@ -154,36 +154,36 @@ class LockStep:
         first = numpy.maximum(numpy.min(sizes, axis=0), memory["step"])
         memory["step"] = numpy.where(starting, first, memory["step"])
         memory["mode"] = numpy.where(starting, LaneTask.GOES, memory["mode"])
-        first, free = JET * (self._sizes["best"] + self._guards), self._free
-        jets = memory["seen"][first : first + JET * free].reshape(free, JET, starting.size)
+        first, switches = JET * (self._sizes["best"] + self._guards), self._switches
+        jets = memory["seen"][first : first + JET * switches].reshape(switches, JET, starting.size)
         told = numpy.take_along_axis(jets, numpy.argmax(jets != 0, axis=1)[:, None], 1)[:, 0]
         sides = numpy.where(starting, -numpy.sign(told), memory["sides"][self._guards :])
         memory["sides"] = memory["sides"].at[self._guards :].set(sides)
 
     def _turn(self, memory: dict[str, Any]) -> None:
         """Tell what each lane does next."""
-        moved, close = memory["moved"][0] > 0, memory["close"][0] > 0
-        settled = self._look(memory, close) if self._search.watched else close
+        moved, inspected = memory["moved"][0] > 0, memory["inspected"][0] > 0
+        settled = self._look(memory, inspected) if self._search.watched else inspected
         over = memory["time"][0] >= memory["end"][0]
-        arrived = moved & ~close & over | settled & (over | (memory["met"] >= 0))
+        arrived = moved & ~inspected & over | settled & (over | (memory["met"] >= 0))
         lost = memory["lost"] > 0
         self._set(memory, arrived & (memory["met"] < 0), met=int(Met.THE_END))
-        self._set(memory, lost, met=int(Met.A_LIMIT))
+        self._set(memory, lost, met=int(Met.GIVEN_UP))
         self._set(memory, arrived | lost | self._hopeless(memory), mode=int(LaneTask.DONE))
 
-    def _look(self, memory: dict[str, Any], close: Any) -> Any:
+    def _look(self, memory: dict[str, Any], inspected: Any) -> Any:
         """Look into last steps; which lanes have nothing more to be looked at."""
         numpy, search, mode, guarded = self._numpy, self._search, memory["mode"], self._sizes["sides"] > 0
         looking, peaks = (mode == LaneTask.GUARDS) | (mode == LaneTask.PEAKS), mode == LaneTask.PEAKS
         search.divide(memory, looking)
-        ready = more = numpy.zeros_like(close)
+        ready = more = numpy.zeros_like(inspected)
         if guarded:
             ready = (mode == LaneTask.CLEARS) | self._land(memory)  # before others are told to land
             more = self._rise(memory)
-        ready = search.open(memory, close, ready)
-        found, peaks = search.next(memory, looking | close | ready), peaks | ready
+        ready = search.open(memory, inspected, ready)
+        found, peaks = search.next(memory, looking | inspected | ready), peaks | ready
         if guarded:
-            guards = (mode == LaneTask.GUARDS) | close & ~peaks
+            guards = (mode == LaneTask.GUARDS) | inspected & ~peaks
             self._set(memory, guards, mode=numpy.where(found, LaneTask.GUARDS, LaneTask.CLEARS))
             self._approach(memory, more | guards & ~found & self._exceeded(memory))
         self._set(memory, peaks, mode=numpy.where(found, LaneTask.PEAKS, LaneTask.GOES))
@@ -210,7 +210,7 @@ class LockStep:
         numpy, low, high = self._numpy, memory["last_time"][0], memory["time"][0]
         guard = numpy.argmax(memory["uppers"] < np.inf, axis=0)
         upper = numpy.take_along_axis(memory["uppers"], guard[None], 0)[0]
-        jets = (self._search.jet(memory, name, self._sizes["best"] + guard) for name in ("last_sight", "sight"))
+        jets = (self._search.jet(memory, name, self._sizes["best"] + guard) for name in ("last_monitored", "monitored"))
         share = numpy.where(on, (upper - low) / (high - low), 1.0)
         part = self._search.root(quintic(high - low, *jets), numpy.zeros_like(low), share, 1.0, 8)
         guess = low + (high - low) * part[0]
@@ -246,7 +246,7 @@ class LockStep:
         numpy, mode, rounding = self._numpy, memory["mode"], self._numpy.finfo(memory["x"].dtype).eps
         passing = (memory["met"] >= self._guards) | (rounding > EPS)
         landed = (mode == LaneTask.LANDS) & ~passing | (mode == LaneTask.PASSES)
-        self._set(memory, landed, time=memory["goal"], x=memory["new"], sight=memory["seen"])
+        self._set(memory, landed, time=memory["goal"], x=memory["new"], monitored=memory["seen"])
         states = slice(0, self._sizes["nominal"])
         change = abs(memory["new"][states] - memory["last_x"][states])
         rate = change / (memory["goal"] - memory["last_time"][0])

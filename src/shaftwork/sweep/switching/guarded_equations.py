@@ -75,7 +75,7 @@ class GuardedEquations(EnsembleEquations):
         where = side_of_limit(excess, bands)
         beyond = ((where > 0) | ((where == 0) & (turns > 0))) & (self.sides != 0)[:, None]
         count = beyond.sum(axis=0)
-        met = np.where(count == 0, Met.NOTHING, np.where(count == 1, beyond.argmax(axis=0), Met.A_LIMIT))
+        met = np.where(count == 0, Met.NOTHING, np.where(count == 1, beyond.argmax(axis=0), Met.GIVEN_UP))
         return PhaseEntry(met, clear_of_limit(excess, bands))
 
     def alone(self, guard: int, t: Array, x: Array, p: Array, motion: tuple[Array, Array]) -> Mask:
