@@ -314,8 +314,8 @@ class _VariantCourse:
             t, old, x = group.t[there], stored[:, there], stored[after.code.state_rows][:, there]
             parameters = after.parameters(self.columns[:, group.lanes[there]])
             new, same = after.code.program.points(t, x, parameters)["stored"], np.ones(t.size, dtype=bool)
-            for kind in after.code.kinds:
-                size = np.maximum(np.abs(old[kind]).max(axis=0, initial=0.0), 1.0)
+            for kind, ordinary in after.kinds:
+                size = np.maximum(np.abs(old[kind]).max(axis=0, initial=0.0), ordinary)
                 same &= (np.abs(new[kind] - old[kind]) <= TYPED * size).all(axis=0)
             groups.append(group.some(there).going_on(modes, t, x).some(same))
         return groups

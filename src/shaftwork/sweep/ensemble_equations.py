@@ -15,6 +15,7 @@ from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.codegen.timeline import Timeline
 from shaftwork.core.errors import CompileError
 from shaftwork.formulation.observables import Observables
+from shaftwork.pipeline.arguments import NOMINAL
 from shaftwork.pipeline.model import Model
 from shaftwork.results.measures import Measure
 from shaftwork.sweep.lane_program import LaneProgram
@@ -113,6 +114,12 @@ class EnsembleEquations:
         self._places = [(places[name], column) for column, name in enumerate(names) if name in places]
         self.sides: Array = np.zeros(0)
         """(guards,) on which each guard is met; 0 where it ends none of the modes."""
+
+    @cached_property
+    def kinds(self) -> list[tuple[list[int], float]]:
+        """Places of what is stored by kind, see `EnsembleCode`, with the size of such states at a speed of 1 rad/s."""
+        sizes = dict(zip(self.code.state_rows, (self.sizes / NOMINAL).tolist(), strict=True))
+        return [(kind, max((sizes.get(place, 0.0) for place in kind), default=0.0)) for kind in self.code.kinds]
 
     def pieces(self, t: Array, p: Array, span: tuple[float, float]) -> Array:
         """(3, k) where lanes at times (k,) begin and stop, and the latest time at which something is evaluated, s.
