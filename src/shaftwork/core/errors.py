@@ -82,6 +82,12 @@ def in_one_line(error: Exception) -> str:
     return f"{lines[0]}: {error.problems[0]}" if isinstance(error, NetworkError) and error.problems else lines[0]
 
 
+def as_reason(text: str) -> str:
+    """The first line of an error, as a reason within a sentence."""
+    line = text.splitlines()[0].rstrip(".")
+    return line[0].lower() + line[1:]
+
+
 def no_value(t: float, law: str) -> SimulationError:
     """The error of a law that has no real value at a time in s of a motion.
 

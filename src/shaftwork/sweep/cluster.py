@@ -174,7 +174,7 @@ class _Calls:
                 f"W{reason[1:]}. Hardly anything else was done meanwhile. What a store has is kept, and the same call "
                 "goes on from there."
             )
-        return Chunk(variant, np.full((1, len(self._task.measures)), np.nan), (reason,), stored=False)
+        return Chunk(variant, np.full((1, len(self._task.measures)), np.nan), (reason,), ("",), stored=False)
 
 
 def measured(

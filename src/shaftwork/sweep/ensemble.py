@@ -18,7 +18,7 @@ from sympy import Expr
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.codegen.state_transfer import StateTransfer
 from shaftwork.components.shafts import Shaft
-from shaftwork.core.errors import CompileError, NetworkError
+from shaftwork.core.errors import CompileError, NetworkError, as_reason
 from shaftwork.network.graph import GraphPart
 from shaftwork.numerics.tolerances import TYPED
 from shaftwork.pipeline.model import Model
@@ -29,11 +29,21 @@ from shaftwork.sweep.ensemble_equations import (
     Mask,
     ModeNames,
     PhaseEntry,
+    Texts,
     VariantGroup,
     joined,
 )
 from shaftwork.sweep.lane_program import LaneProgram, lane_program
 from shaftwork.sweep.lane_tables import LaneCourse, LaneEnd, Met
+
+STIFF = "it is stiff or swings very often, or its peaks are too many to be told apart"
+NO_END = "a law drives it back to its jump, or its modes change without end"
+OTHER_START = "it starts at or beyond a rigid limit, or in other modes than the first one"
+ZERO = "it has a zero where the first one has none, or ratios that meet"
+NO_MODES = "what follows an instant is told by its own run"
+INFINITE = "a measure of it is no finite number"
+MOST_STRETCHES, MOST_SWITCHES = 2000, 200
+"""Changes of mode and switches of laws of one variant; where there are more, a run of its own says what is wrong."""
 
 
 class Ensemble:
@@ -126,6 +136,11 @@ class Ensemble:
         equations = self._equations[modes]
         return None if isinstance(equations, str) else equations
 
+    def objection(self, modes: ModeNames) -> str:
+        """Why variants cannot run side by side in a combination of modes; empty where they can."""
+        equations = self._equations[modes]
+        return as_reason(equations) if isinstance(equations, str) else ""
+
     def _equations_in(self, modes: ModeNames) -> EnsembleEquations:  # noqa: ARG002
         """The equations of a combination of modes.
 
@@ -147,14 +162,14 @@ class Ensemble:
             self._codes[model] = EnsembleCode(model, guards, stores, self.measures, self._program)
         return self._codes[model]
 
-    def run(self, columns: Array) -> tuple[Array, Mask]:
+    def run(self, columns: Array) -> tuple[Array, Texts]:
         """Measures of variants.
 
         Args:
             columns: (names, k) values of the parameters that vary.
 
         Returns:
-            (measures, k), and (k,) whether a variant has come to its end here; of the others nothing is known.
+            (measures, k), and (k,) texts: why a variant has not come to its end here, empty where it has.
         """
         return _VariantCourse(self, columns).go()
 
@@ -197,26 +212,30 @@ class _VariantCourse:
         starts = {"max": -np.inf, "min": -np.inf, "peak": -np.inf}
         self.values = np.array([np.full(count, starts.get(kind, 0.0)) for kind in kinds]).reshape(len(kinds), count)
         self._extreme = np.array([kind in EXTREMES for kind in kinds], dtype=bool)
-        self.done = np.zeros(count, dtype=bool)
+        self._left = np.full(count, NO_END, dtype=object)
+        """Why each of them is left to a run of its own."""
         self._switched = np.zeros(count, dtype=np.intp)
 
-    def go(self) -> tuple[Array, Mask]:
+    def go(self) -> tuple[Array, Texts]:
         """Through all of it."""
         waiting = self._begin()
         with np.errstate(all="ignore"):  # a lane that runs away is left to `simulate`
-            for _ in range(2000):  # stretches up to a change of mode
+            for _ in range(MOST_STRETCHES):
                 if not waiting:
                     break
                 waiting = [following for group in joined(waiting) for following in self._stretch(group)]
-        return self._results(), self.done
+        return self._results(), self._left
 
     def _begin(self) -> list[VariantGroup]:
         ensemble = self.ensemble
         equations = ensemble.equations(ensemble.start)
         assert equations is not None  # noqa: S101 (checked when it was made)
-        lanes = np.flatnonzero(ensemble.alike(self.columns) & ~ensemble.apart(self.columns))
+        alike, apart = ensemble.alike(self.columns), ensemble.apart(self.columns)
+        self._left[apart], self._left[~alike] = OTHER_START, ZERO
+        lanes = np.flatnonzero(alike & ~apart)
         if ensemble.decisive:
-            lanes = lanes[[ensemble.starts_alike(column) for column in self.columns[:, lanes].T]]
+            same = np.array([ensemble.starts_alike(column) for column in self.columns[:, lanes].T], dtype=bool)
+            self._left[lanes[~same]], lanes = OTHER_START, lanes[same]
         size = len(equations.code.model.states)
         return [
             VariantGroup(
@@ -233,6 +252,7 @@ class _VariantCourse:
         """Up to the next change of mode, or instant at which a law jumps; the groups that go on from there."""
         equations = self.ensemble.equations(group.modes)
         if equations is None or not group.lanes.size:
+            self._left[group.lanes] = self.ensemble.objection(group.modes)
             return []
         p, program = equations.parameters(self.columns[:, group.lanes]), equations.code.program
         begin, ends, highs = equations.pieces(group.t, p, self.ensemble.span)
@@ -255,9 +275,10 @@ class _VariantCourse:
         self.values[:, group.lanes] = np.where(self._extreme[:, None], end.best, self.values[:, group.lanes])
         there, met = replace(group.going_on(group.modes, end.t, end.x), steps=end.steps), end.met
         over = (met == Met.THE_END) & (end.t >= self.ensemble.span[1])
+        self._left[group.lanes] = np.where(met == Met.GIVEN_UP, STIFF, NO_END)
         self._end(equations, there, course, over)
         self._switched[group.lanes[met >= program.guards]] += 1
-        switched = (met >= program.guards) & (self._switched[group.lanes] < 200)  # more of them come to no end
+        switched = (met >= program.guards) & (self._switched[group.lanes] < MOST_SWITCHES)
         onward = (met == Met.THE_END) & ~over | switched  # in the same modes
         ended = np.where((met >= 0) & (met < program.guards), met, Met.NOTHING)
         past = self._past_guards(equations, there, end.t, PhaseEntry(ended, entry.offsets))
@@ -276,6 +297,7 @@ class _VariantCourse:
         for k in np.flatnonzero((entry.met != Met.NOTHING) & ~changed):
             one, values = np.array([k]), self.columns[:, group.lanes[k]]
             new = self.ensemble.settled(group.some(one), values, after[k], entry.some(one))
+            self._left[group.lanes[one]] = NO_MODES if new is None else NO_END
             groups += [] if new is None else [new]
         return groups
 
@@ -322,7 +344,7 @@ class _VariantCourse:
 
     def _end(self, equations: EnsembleEquations, group: VariantGroup, course: LaneCourse, over: Mask) -> None:
         """The variants that have come to the end of their motion: just before it, where a law jumps there."""
-        self.done[group.lanes[over]] = True
+        self._left[group.lanes[over]] = ""
         if any(measure.kind == "end" for measure in self.ensemble.measures) and over.any():
             before = np.minimum(group.t, course.highs)[over]
             shown = equations.code.program.points(before, group.x[:, over], course.p[:, over])["shown"]
@@ -339,5 +361,5 @@ class _VariantCourse:
             elif measure.kind in ("mean", "rms"):
                 values[row] /= duration
                 values[row] = np.sqrt(np.maximum(values[row], 0.0)) if measure.kind == "rms" else values[row]
-        self.done &= np.isfinite(values).all(axis=0)
+        self._left[(self._left == "") & ~np.isfinite(values).all(axis=0)] = INFINITE
         return values

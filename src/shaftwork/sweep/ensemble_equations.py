@@ -22,6 +22,7 @@ from shaftwork.sweep.lane_program import LaneProgram
 from shaftwork.sweep.lane_tables import Met
 
 Mask = NDArray[np.bool_]
+Texts = NDArray[np.object_]
 ModeNames = tuple[str, ...]
 """The mode of every element; empty where no part changes its mode."""
 

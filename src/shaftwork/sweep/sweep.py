@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
@@ -39,10 +40,6 @@ from shaftwork.sweep.sweep_task import SIDE_BY_SIDE, Chunk, Index, Reader, Task,
 
 if TYPE_CHECKING:
     from shaftwork.sweep.device.device_lanes import Device
-
-LEFT = "a zero, a stiff motion, one without end or one that a law drives back to its jump is left to `simulate`"
-"""Why variants have left those beside them."""
-
 
 Measures = Mapping[str, "str | Callable[[Solution], float]"] | Iterable[str]
 
@@ -180,12 +177,12 @@ def _run(
 ) -> tuple[Array, tuple[str, ...], str]:
     """(variants, measures), why variants failed, and why some or all ran one by one."""
     values, reasons = np.full((len(task), len(task.measures)), np.nan), [""] * len(task)
-    open_, alone, failed = np.ones(len(task), dtype=bool), 0, 0
+    open_, alone, failed = np.ones(len(task), dtype=bool), dict[int, str](), 0
 
     def take(chunk: Chunk) -> None:
-        nonlocal alone, failed
+        nonlocal failed
         new = open_[chunk.variants]  # a store may hold some twice
-        alone += min(chunk.left, int(new.sum()))
+        alone.update((k, why) for k, why in zip(chunk.variants.tolist(), chunk.alone, strict=True) if why)
         failed += sum(bool(reason) for reason in compress(chunk.reasons, new))
         values[chunk.variants], open_[chunk.variants] = chunk.values, False
         for variant, reason in zip(chunk.variants.tolist(), chunk.reasons, strict=True):
@@ -200,8 +197,15 @@ def _run(
                     store.append(chunk)
                 take(chunk)
                 show(len(task) - int(open_.sum()), f"{failed} failed" if failed else "sweep")
-    said = f"{alone} of {len(task)} variants ran one by one: {LEFT}" if alone else ""
-    return values, tuple(reasons), worker.why or said
+    return values, tuple(reasons), worker.why or _said(alone, len(task))
+
+
+def _said(alone: Mapping[int, str], count: int) -> str:
+    """How many of so many variants ran by themselves, for each reason."""
+    if not alone:
+        return ""
+    parts = "; ".join(f"{number} because {why}" for why, number in Counter(alone.values()).most_common())
+    return f"{len(alone)} of {count} variants ran one by one: {parts}"
 
 
 def _chunks(worker: Worker, task: Task, variants: Index, processes: int | None, on: Any) -> Iterator[Chunk]:

@@ -27,7 +27,7 @@ from shaftwork.sweep.sweep_task import Chunk, Reader, Task
 TABLES = (
     "CREATE TABLE IF NOT EXISTS sweep (what TEXT PRIMARY KEY, value TEXT)",
     "CREATE TABLE IF NOT EXISTS chunks "
-    "(number INTEGER PRIMARY KEY, variants BLOB, measured BLOB, reasons TEXT, alone INTEGER, digest TEXT)",
+    "(number INTEGER PRIMARY KEY, variants BLOB, measured BLOB, reasons TEXT, alone TEXT, digest TEXT)",
 )
 """What the sweep is, and its chunks: numbers of 64 bits, texts by place in the chunk, see `Chunk`."""
 
@@ -119,9 +119,12 @@ class Store:
             return None
         variants, measured, reasons, alone = stored
         numbers = np.frombuffer(variants, dtype="<i8").astype(np.intp)
-        texts = json.loads(reasons)
         values = np.frombuffer(measured, dtype="<f8").reshape(-1, len(task.measures))
-        return Chunk(numbers, values, tuple(texts.get(str(place), "") for place in range(numbers.size)), alone)
+        failed, left = (
+            tuple(texts.get(str(place), "") for place in range(numbers.size))
+            for texts in (json.loads(reasons), json.loads(alone))
+        )
+        return Chunk(numbers, values, failed, left)
 
     def append(self, chunk: Chunk) -> None:
         """Write what has been done.
@@ -129,11 +132,14 @@ class Store:
         Raises:
             ParameterError: it cannot be written.
         """
-        reasons = {str(place): reason for place, reason in enumerate(chunk.reasons) if reason}
+        reasons, alone = (
+            json.dumps({str(place): text for place, text in enumerate(texts) if text})
+            for texts in (chunk.reasons, chunk.alone)
+        )
         numbers, values = (
             np.ascontiguousarray(a, dtype=k).tobytes() for a, k in ((chunk.variants, "<i8"), (chunk.values, "<f8"))
         )
-        stored = numbers, values, json.dumps(reasons), chunk.left
+        stored = numbers, values, reasons, alone
         row = "INSERT INTO chunks (variants, measured, reasons, alone, digest) VALUES (?, ?, ?, ?, ?)"
         try:
             self._database.execute(row, (*stored, _digest(*stored)))
@@ -163,7 +169,7 @@ class Store:
             raise ParameterError(f"store = '{self._path}' {reason}.") from None
 
 
-def _digest(variants: bytes, measured: bytes, reasons: str, alone: int) -> str:
+def _digest(variants: bytes, measured: bytes, reasons: str, alone: str) -> str:
     """Of all that a chunk says: a bit that was changed changes it."""
     return hashlib.sha256(b"".join((variants, measured, f"{reasons}{alone}".encode()))).hexdigest()
 

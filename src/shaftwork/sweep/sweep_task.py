@@ -29,6 +29,7 @@ from shaftwork.core.errors import (
     ParameterError,
     ShaftworkError,
     SimulationError,
+    as_reason,
     in_one_line,
     no_quantity,
 )
@@ -52,9 +53,7 @@ SIDE_BY_SIDE, FIRST_CHUNK, CHUNK, DEVICE_CHUNK, LONE_CHUNK = 16, 512, 2048, 6553
 """Variants: from which on it is worth while to compile a program for many of them; and that are computed and stored at
 once: side by side at first and at most, on a graphics processor, and one by one."""
 
-
 Index = NDArray[np.intp]
-
 Reader = Measure | Callable[[Solution], float]
 
 
@@ -102,14 +101,14 @@ class Chunk:
         variants: (k,) their numbers.
         values: (k, measures); NaN where a variant failed.
         reasons: k texts; empty where it did not.
-        left: how many could not be followed side by side and ran one by one.
+        alone: k texts: why a variant ran by itself where others run side by side; empty of others.
         stored: whether a store takes it; not where computers failed, since the same call may do better.
     """
 
     variants: NDArray[np.intp]
     values: Array
     reasons: tuple[str, ...]
-    left: int = 0
+    alone: tuple[str, ...]
     stored: bool = True
 
 
@@ -171,8 +170,7 @@ class Worker:
             try:
                 ensemble = kind(self._model, names, first, read, span, options["rtol"], *programs)
             except CompileError as error:
-                reason = str(error).splitlines()[0].rstrip(".")
-                self.why = reason[0].lower() + reason[1:]
+                self.why = as_reason(str(error))
                 return None
             except ShaftworkError:
                 self.why = "the first of them fails, and the network as it is too"
@@ -191,16 +189,15 @@ class Worker:
         rows = self._task.rows(variants) if rows is None else rows
         values = np.full((variants.size, len(self._task.measures)), np.nan)
         reasons = [self._objection(row, rows) if self._checked_parts else "" for row in range(variants.size)]
-        open_ = np.array([not reason for reason in reasons])
+        open_, alone = np.array([not reason for reason in reasons]), np.full(variants.size, "", dtype=object)
         if self._ensemble is not None and open_.any():
             here = np.flatnonzero(open_)
-            measured, done = self._ensemble.run(np.array([column[here] for column in rows.values()]))
-            values[here[done]] = measured[:, done].T
-            open_[here[done]] = False
-        left = 0 if self._ensemble is None else int(open_.sum())
+            measured, left = self._ensemble.run(np.array([column[here] for column in rows.values()]))
+            done, alone[here] = left == "", left
+            values[here[done]], open_[here[done]] = measured[:, done].T, False
         for row in np.flatnonzero(open_).tolist():
             values[row], reasons[row] = self._alone({name: float(column[row]) for name, column in rows.items()})
-        return Chunk(variants, values, tuple(reasons), left)
+        return Chunk(variants, values, tuple(reasons), tuple(alone))
 
     @cached_property
     def _checked_parts(self) -> list[tuple[Component, list[tuple[str, str]]]]:
@@ -293,7 +290,7 @@ def chunks(worker: Worker, task: Task, variants: Index, processes: int | None) -
             left takes long enough, others also where so many are asked for.
 
     Raises:
-        ParameterError: processes are asked for, and a measure cannot be sent to them.
+        ParameterError: a measure cannot be sent to the processes that are asked for.
     """
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         sys.exit(1)  # a script without a guard, run again by a process that it has started: the first one says so
