@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
+from functools import partial
 from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,6 +28,7 @@ from shaftwork.pipeline.arguments import (
     repeated,
     time_span,
 )
+from shaftwork.pipeline.columns import column_in_si
 from shaftwork.pipeline.motion_start import ending_of, refuse_motion, time_of_start
 from shaftwork.pipeline.network import Network, network_of
 from shaftwork.results.fatigue import SNLine
@@ -224,10 +226,13 @@ def _columns(netlist: Netlist, parameters: Any, samples: Any) -> dict[str, Array
     table = samples if parameters is None else parameters
     if not hasattr(table, "items"):
         raise ParameterError(f"{table!r} must map parameters to their values, such as {{'shaft.c': [2e4, 3e4]}}.")
-    named = [(str(name), _plain(values)) for name, values in table.items()]
+    named = [(str(name), values) for name, values in table.items()]
     if twice := repeated(name for name, _ in named):  # a data frame may have two columns of one name
         raise ParameterError(f"There are two columns '{twice}'. Give each parameter one.")
-    checked = {name: _checked(netlist, name, values) for name, values in named}
+    checked = {
+        name: column_in_si(name, values, partial(checked_parameter, netlist, name), rows=parameters is None)
+        for name, values in named
+    }
     if not checked or not all(len(values) for values in checked.values()):
         raise ParameterError("A sweep needs at least one parameter, and a value for each.")
     if parameters is None:
@@ -250,38 +255,6 @@ def _grid(values: Mapping[str, Array]) -> dict[str, Array]:
         )
     grids = np.meshgrid(*values.values(), indexing="ij")
     return {name: grid.ravel() for name, grid in zip(values, grids, strict=True)}
-
-
-def _checked(netlist: Netlist, name: str, values: Any) -> Array:
-    """(k,) values of one parameter in SI, each admissible by itself."""
-    if isinstance(values, str) or not isinstance(values, Iterable):
-        raise ParameterError(f"'{name}': {values!r} must be a sequence of values. Write [{values!r}].")
-    if not isinstance(values, np.ndarray):
-        values = list(values)
-        values = np.array(values) if all(type(value) is float for value in values) else values
-    numbers = values if isinstance(values, np.ndarray) and values.dtype == float and values.ndim == 1 else None
-    examples = values if numbers is None else _telling(numbers)
-    admissible = [checked_parameter(netlist, name, value) for value in examples]
-    return np.array(admissible if numbers is None else numbers, dtype=float)
-
-
-def _plain(values: Any) -> Any:
-    """A column of a data frame as an array."""
-    return values.to_numpy() if hasattr(values, "to_numpy") else values
-
-
-def _telling(values: Array) -> list[float]:
-    """Of many numbers those that tell whether all are admissible.
-
-    Bounds are on values and on sizes, refuse zero, or refuse what is not whole.
-    """
-    if not np.isfinite(values).all():
-        return [float(values[~np.isfinite(values)][0])]
-    ends = [values[pick(values)] for pick in (np.argmin, np.argmax)] if values.size else []
-    sizes = np.abs(values[values != 0.0])
-    smallest = values[values != 0.0][[sizes.argmin()]] if sizes.size else sizes
-    broken = values[[np.abs(values - np.round(values)).argmax()]] if values.size else values
-    return [*map(float, ends), *smallest.tolist(), *broken.tolist(), *([0.0] if sizes.size < values.size else [])]
 
 
 def _readers(measures: Measures, columns: Iterable[str]) -> dict[str, Reader]:
