@@ -11,7 +11,7 @@ from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import ParameterError
 
 Checked = Callable[[Any, str], float]
-"""From a value, and words for where it stands, to the number in SI; raises a ParameterError where it is not admissible."""
+"""From a value, and words for where it stands, to the number in SI, or a ParameterError that says both."""
 
 
 def has_many(values: Any) -> bool:

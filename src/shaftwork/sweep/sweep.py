@@ -29,6 +29,7 @@ from shaftwork.pipeline.arguments import (
     time_span,
 )
 from shaftwork.pipeline.columns import column_in_si
+from shaftwork.pipeline.measured_units import units_of
 from shaftwork.pipeline.motion_start import ending_of, refuse_motion, time_of_start
 from shaftwork.pipeline.network import Network, network_of
 from shaftwork.results.fatigue import SNLine
@@ -83,7 +84,7 @@ def sweep(
         measures: names such as "max shaft.tau", or a mapping from names of your own to these, or to functions of a
             solution. First words are "max", "min", "peak", "mean", "rms", "end" and "damage", see
             `results.measures.KINDS`.
-        require: by measure, (low, high); None leaves a side open.
+        require: by measure, (low, high), numbers in its SI unit or quantities; None leaves a side open.
         sn: S-N line for measures of damage, or one by quantity.
         rtol: relative tolerance of a step; the absolute one beside it is `rtol` times the size of a state at a speed of
             0.001 rad/s.
@@ -106,7 +107,8 @@ def sweep(
     columns = _columns(network_of(net).netlist(), parameters, samples)
     start = _start(net, initial, steady=steady)
     readers = _readers(measures, columns)
-    limits = _limits(require, readers)
+    units = units_of(net, readers)
+    limits = _limits(require, readers, units)
     _, end = time_span(time_of_start(None, start), t_end)
     options = _options(readers, rtol, engine, start, t_eval)
     device = _device(on, precision)
@@ -115,7 +117,7 @@ def sweep(
     worker = Worker(task, device)
     values, reasons, why = _run(worker, task, _count(processes), on, store)
     errors = _errors(task, values, reasons) if told == "single" and not worker.why else {}
-    return Sweep(net.name, columns, dict(zip(readers, values.T, strict=True)), limits, reasons, why, errors)
+    return Sweep(net.name, columns, dict(zip(readers, values.T, strict=True)), limits, reasons, why, errors, units)
 
 
 def _device(on: Any, precision: str) -> Device | None:
@@ -272,10 +274,12 @@ def _readers(measures: Measures, columns: Iterable[str]) -> dict[str, Reader]:
     return readers
 
 
-def _limits(require: Mapping[str, Any] | None, readers: Mapping[str, Reader]) -> dict[str, Limits]:
+def _limits(
+    require: Mapping[str, Any] | None, readers: Mapping[str, Reader], units: Mapping[str, str]
+) -> dict[str, Limits]:
     if others := [name for name in require or {} if name not in readers]:
         raise ParameterError(f"require: there is no measure '{others[0]}'. There are: {', '.join(readers)}.")
-    return limits_of(require or {})
+    return limits_of(require or {}, units.get)
 
 
 def _lines(sn: Any, readers: Mapping[str, Reader]) -> dict[str, SNLine]:
