@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -45,17 +46,109 @@ def test_times_with_units_are_converted_or_refused() -> None:
 
 
 def test_numbers_in_the_unit_of_a_quantity_that_is_named_elsewhere_refuse_units_of_their_own() -> None:
-    """A line of cycles and the limit of a measure do not know what is counted, so 2 kN m could be taken for 2 N m."""
+    """A line of cycles and the limit of a function do not know what is counted, so 2 kN m could be taken for 2 N m."""
     torque, net = 2.0 * UNIT.kN * UNIT.m, train()
-    limits = {"max shaft.tau": (None, torque)}
-    with pytest.raises(sw.ParameterError, match=r"require\['max shaft.tau'\] = 2.0 .* has a unit"):
-        sw.studies.sweep(net, {"shaft.c": [1e4]}, t_end=0.1, measures=["max shaft.tau"], require=limits)
+    for find in (
+        lambda: sw.studies.sweep(
+            net, {"shaft.c": [1e4]}, t_end=0.1, measures={"own": lambda _: 1.0}, require={"own": (None, torque)}
+        ),
+        lambda: sw.optimize(
+            net,
+            {"shaft.c": (1e4, 2e4)},
+            "max shaft.tau",
+            t_end=0.1,
+            functions={"own": lambda _: 1.0},
+            require={"own": (None, torque)},
+        ),
+    ):
+        with pytest.raises(sw.ParameterError, match=r"require\['own'\] = 2.0 .* has a unit"):
+            find()
     line = {"amplitude": 2e3, "cycles": 1e6, "slope": 5.0}
     for name in ("amplitude", "limit", "ultimate"):
         with pytest.raises(sw.ParameterError, match=rf"{name} = 2.0 .* has a unit"):
             sw.SNLine(**{**line, name: torque})
     with pytest.raises(sw.ParameterError, match=r"amplitude = 2.0 .* has a unit"):
         sw.SNLine(**line).borne(torque)
+
+
+def test_limits_of_measures_are_converted_to_the_unit_of_their_quantity() -> None:
+    net, low, high = train(), 60.0 * UNIT.rpm, 2.0 * UNIT.kN * UNIT.m
+    wanted = {
+        "end J1.omega": (low, None),
+        "max shaft.tau": (None, high),
+        "peak shaft.tau": [1.0, 2.0] * UNIT.kN * UNIT.m,
+    }
+    made = sw.studies.sweep(net, {"shaft.c": [1e4]}, t_end=0.1, measures=list(wanted), require=wanted)
+    assert made.require["end J1.omega"] == (pytest.approx(2.0 * math.pi, rel=1e-14), None)  # a product of two numbers
+    assert made.require["max shaft.tau"] == (None, 2000.0)
+    assert made.require["peak shaft.tau"] == (1000.0, 2000.0)
+    found = sw.optimize(
+        net, {"shaft.c": (1e4, 2e4)}, "rms shaft.tau", t_end=0.1, require={"max shaft.tau": (None, high)}
+    )
+    assert found.require["max shaft.tau"] == (None, 2000.0)
+    for find in (
+        lambda pair: sw.studies.sweep(
+            net, {"shaft.c": [1e4]}, t_end=0.1, measures=["max shaft.tau"], require={"max shaft.tau": pair}
+        ),
+        lambda pair: sw.optimize(
+            net, {"shaft.c": (1e4, 2e4)}, "rms shaft.tau", t_end=0.1, require={"max shaft.tau": pair}
+        ),
+    ):
+        with pytest.raises(
+            sw.ParameterError, match=r"require\['max shaft.tau'\]\[1\] is given in 'newton', but needs N\*m"
+        ):
+            find((None, 2.0 * UNIT.N))
+
+
+def test_the_limit_of_a_probability_is_converted_and_that_of_a_function_refused() -> None:
+    made = sw.studies.uncertainty(
+        train(), {"J1.J": (1.0, 2.0)}, measures=["end J1.omega"], t_end=0.1, samples=16, processes=1
+    )
+    middle = float(np.median(made.values("end J1.omega")))
+    for side in ("above", "below"):
+        assert made.probability("end J1.omega", **{side: middle * 1e3 * UNIT.mrad / UNIT.s}) == made.probability(
+            "end J1.omega", **{side: middle}
+        )
+        assert made.probability("end J1.omega", **{side: middle}).value == 0.5
+        with pytest.raises(sw.ParameterError, match=rf"{side} is given in 'newton', but needs rad/s"):
+            made.probability("end J1.omega", **{side: 1.0 * UNIT.N})
+    own = sw.studies.uncertainty(lambda columns: {"y": columns["a"]}, {"a": (0.0, 1.0)}, samples=8)
+    with pytest.raises(sw.ParameterError, match=r"above = .* has a unit"):
+        own.probability("y", above=1.0 * UNIT.N)
+
+
+@pytest.mark.parametrize("study", ["uncertainty", "bands"])
+def test_uncertain_parameters_are_converted_or_refused_as_those_of_a_sweep(study: str) -> None:
+    def columns(distribution: object) -> np.ndarray:
+        distributions, net = {"shaft.c": distribution}, train()
+        if study == "bands":
+            return sw.studies.bands(net, "shaft.tau", [0.0, 0.1], distributions, samples=8).parameters["shaft.c"]
+        options = {"measures": ["max shaft.tau"], "t_end": 0.1, "samples": 8, "processes": 1}
+        return sw.studies.uncertainty(net, distributions, **options).sweep.parameters["shaft.c"]
+
+    stiffness = UNIT.kN * UNIT.m / UNIT.rad
+    uniform = columns((20e3, 30e3))
+    assert ((uniform >= 20e3) & (uniform < 30e3)).all()
+    for same in ((20.0 * stiffness, 30e3), (20.0 * stiffness, 30.0 * stiffness)):
+        assert columns(same) == pytest.approx(uniform, rel=1e-14)  # a product of two numbers
+    listed = columns([20e3, 30e3])
+    for same in ([20.0 * stiffness, 30e3], [20.0, 30.0] * stiffness):
+        assert columns(same) == pytest.approx(listed, rel=1e-14)
+    for wrong in ((20.0 * UNIT.N, 30.0 * UNIT.N), [20.0 * UNIT.N, 30e3], [20.0, 30.0] * UNIT.N):
+        with pytest.raises(sw.ParameterError, match=r"'shaft': c = .* is given in 'newton', but needs N\*m/rad"):
+            columns(wrong)
+    for text in (("a", "b"), ["a", 30e3]):
+        with pytest.raises(sw.ParameterError, match="'shaft': c = 'a' must be a number"):
+            columns(text)
+    with pytest.raises(sw.ParameterError, match=r"'shaft\.c': .* is no distribution"):
+        columns(20.0 * stiffness)
+
+
+def test_values_of_one_parameter_with_units_are_several() -> None:
+    with pytest.raises(sw.ParameterError, match=r"'shaft\.c': .* must be a sequence of values"):
+        sw.studies.sweep(
+            train(), {"shaft.c": 20.0 * UNIT.kN * UNIT.m / UNIT.rad}, t_end=0.1, measures=["max shaft.tau"]
+        )
 
 
 def test_states_and_parameters_of_a_right_hand_side_are_plain_numbers_one_for_each() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import pickle
 import sys
 from collections.abc import Iterable
@@ -233,6 +234,33 @@ def test_requirements_filter_and_a_measure_ranks() -> None:
     assert made.best("swing", 1, largest=True).measures["swing"][0] == made.measures["swing"][made.passed].max()
     with pytest.raises(sw.ParameterError, match="There is no measure 'tau'"):
         made.best("tau")
+    worst = made.best("largest", largest=True, ignore_require=True)
+    assert worst.measures["largest"].tolist() == sorted(made.measures["largest"].tolist(), reverse=True)
+    assert worst.require == made.require
+    assert not worst.passed[0]
+
+
+def test_a_variant_that_does_not_pass_says_which_limits_it_misses_or_why_it_failed(tmp_path: Path) -> None:
+    """The torque after 0.05 s is tau (1 - cos 1), the speed tau sin 1 / 40; a brake opens after it closes."""
+    net = swing()
+    net.add(sw.Brake("brake", tau=0.1, t_on=0.1, t_off=0.4), "a")
+    made = sweep(
+        net,
+        {"motor.tau": [0.4, 5.0, 20.0], "brake.t_on": [0.1, 0.5]},
+        t_end=0.05,
+        measures={"largest": "max shaft.tau", "own": "end J.omega"},
+        require={"largest": (1.0, 8.0), "own": (None, 0.2)},
+    )
+    texts = made.columns["reason"].tolist()
+    assert texts[::2] == ["largest below 1", "", "largest above 8, own above 0.2"]
+    assert all("t_off" in text for text in texts[1::2])
+    assert list(made.reasons) == ["", texts[1], "", texts[3], "", texts[5]]  # of those that failed alone
+    assert made.passed.tolist() == [not text for text in texts]
+    made.to_csv(tmp_path / "t.csv")
+    with (tmp_path / "t.csv").open(newline="") as file:
+        assert [row["reason"] for row in csv.DictReader(file)] == texts
+    assert texts[0] in str(made).splitlines()[2]
+    assert len(made.best("largest", ignore_require=True)) == 3  # none of those that failed
 
 
 @pytest.mark.parametrize(
@@ -240,8 +268,11 @@ def test_requirements_filter_and_a_measure_ranks() -> None:
     [
         ({"parameters": {"shaft.k": [1.0]}}, r"no parameter 'shaft.k'. There are: shaft.c, shaft.d"),
         ({"parameters": {"shaft.c": [1.0, -2.0]}}, r"shaft.*c = -2.0 must be at least 0"),
-        ({"samples": {"shaft.c": np.array([1.0, -3.0, 2.0])}}, r"shaft.*c = -3.0 must be at least 0"),
-        ({"samples": {"J.J": np.array([1.0, np.nan])}}, r"J.*J = nan must be a finite number"),
+        (
+            {"samples": {"shaft.c": np.array([1.0, -3.0, 2.0])}},
+            r"shaft.*c = -3.0 in row 1 of 'shaft.c' must be at least 0",
+        ),
+        ({"samples": {"J.J": np.array([1.0, np.nan])}}, r"J.*J = nan in row 1 of 'J.J' must be a finite number"),
         ({"parameters": {"shaft.c": 3.0}}, r"must be a sequence of values"),
         ({"parameters": {"shaft.c": []}}, r"at least one parameter, and a value"),
         ({"samples": {"shaft.c": [1.0], "J.J": [1.0, 2.0]}}, r"differ in length: shaft.c 1, J.J 2"),

@@ -86,6 +86,32 @@ def test_a_data_frame_with_two_columns_of_one_name_is_refused() -> None:
         sw.studies.sweep(net, samples=frame, t_end=0.1, measures=["end J.omega"])
 
 
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (-1.0, "tau = -1.0 in row 41 of 'load.tau' must be at least 0"),
+        (np.nan, "tau = nan in row 41 of 'load.tau' must be a finite number"),
+        (-np.inf, "tau = -inf in row 41 of 'load.tau' must be a finite number"),
+        ("a", "tau = 'a' in row 41 of 'load.tau' must be a number"),
+    ],
+)
+@pytest.mark.parametrize("kind", [list, lambda values: np.array(values, dtype=object), np.array])
+def test_what_is_not_admissible_in_a_table_is_named_by_row_and_column(kind: Any, wrong: Any, words: str) -> None:
+    if kind is np.array and wrong == "a":
+        return  # of numpy a text would make all of them texts
+    column = kind([1.0] * 41 + [wrong] + [2.0] * 9)
+    net = train(sw.CoulombLoad("load", tau=1.0))
+    with pytest.raises(sw.ParameterError, match=words):
+        sw.studies.sweep(net, samples={"J.J": np.ones(51), "load.tau": column}, t_end=0.1, measures=["end J.omega"])
+
+
+def test_rows_of_a_data_frame_are_counted_from_zero_whatever_its_index() -> None:
+    frame = pytest.importorskip("pandas").DataFrame({"load.tau": [1.0, None, 3.0]}, index=[7, 8, 9])
+    net = train(sw.CoulombLoad("load", tau=1.0))
+    with pytest.raises(sw.ParameterError, match=r"tau = nan in row 1 of 'load\.tau'"):
+        sw.studies.sweep(net, samples=frame, t_end=0.1, measures=["end J.omega"])
+
+
 @pytest.mark.parametrize("values", [[1.0, 1.5, 2.0], np.array([3.0, 1.0, 2.5, 1.0])])
 def test_what_must_be_whole_is_refused_wherever_it_is_not(values: Any) -> None:
     net = train(sw.AveragedBLDC("m", U=48.0, R=0.5, L=1e-3, k=0.1, pole_pairs=2))

@@ -158,8 +158,19 @@ def test_bands_hold_the_courses_and_the_mean() -> None:
 
 
 def test_a_sample_that_is_not_admissible_is_named() -> None:
-    with pytest.raises(sw.ParameterError, match=r"The sample .*-1"):
-        sw.studies.bands(sw.scenes.crane_start(), "shaft.tau", [0.0, 0.1], {"J1.J": [27.0, -1.0]})
+    for values, words in (([27.0, -1.0], "'J1': J = -1.0 must be"), (stats.norm(-27.0, 1.0), "The sample .*J1.*-2")):
+        with pytest.raises(sw.ParameterError, match=words):
+            sw.studies.bands(sw.scenes.crane_start(), "shaft.tau", [0.0, 0.1], {"J1.J": values}, samples=None)
+    with pytest.raises(sw.ParameterError, match=r"'one': tau = .* in row \d+ of 'one\.tau' must be a finite number"):
+        uncertainty(
+            two_motors(), {"one.tau": stats.cauchy(0.0, np.inf)}, measures=["end J.omega"], t_end=1.0, samples=8
+        )
+
+
+@pytest.mark.parametrize("ends", [("a", 1.0), (0.0, "b"), (None, 1.0), (0.0, np.nan)])
+def test_what_a_function_is_given_are_numbers(ends: tuple[object, object]) -> None:
+    with pytest.raises(sw.ParameterError, match=r"'a' = .* must be a"):
+        uncertainty(lambda columns: {"y": columns["a"]}, {"a": ends}, samples=8)
 
 
 def test_bands_over_seeds_take_each_seed_once() -> None:

@@ -19,7 +19,9 @@ from shaftwork.numerics.tolerances import TYPED
 from shaftwork.optimization.measured_motion import Goal, MeasuredMotion
 from shaftwork.optimization.optimum import Attempt, Optimum
 from shaftwork.pipeline.arguments import checked_parameter, range_of, relative_tolerance, time_span
+from shaftwork.pipeline.measured_units import units_of
 from shaftwork.pipeline.network import Network, network_of, with_values
+from shaftwork.results.measures import Measure
 from shaftwork.sweep.sweep_result import Limits, limits_of
 
 OBJECTIVE = "objective"
@@ -52,7 +54,8 @@ def optimize(
         variables: (low, high) by parameter.
         goal: a measure, "max shaft.tau", or a function of all parameters, such as a mass or a price.
         t_end: end of the motion, s.
-        require: (low, high) by measure, or by name of `functions`; None leaves a side open.
+        require: (low, high) by measure, in its SI unit or with units, or by name of `functions`; None leaves a side
+            open.
         functions: of all parameters, by name, to be limited.
         choices: parts of a catalogue: by name, sets of parameters of which one is taken; every combination is tried.
         maximize: whether the goal is made largest.
@@ -70,7 +73,7 @@ def optimize(
         raise ParameterError(f"starts = {starts!r} must be a whole number, 1 or more.")
     if OBJECTIVE in (functions or {}):
         raise ParameterError(f"'{OBJECTIVE}' is the name of the goal. Give the function another one.")
-    limits = limits_of(require or {})
+    limits = limits_of(require or {}, partial(_unit, net, functions or {}))
     if unused := [other for other in functions or {} if other not in limits]:
         raise ParameterError(
             f"'{unused[0]}' is a function without limits. Give require={{'{unused[0]}': (low, high)}}."
@@ -90,6 +93,11 @@ def optimize(
                 )
                 show(len(attempts), "optimize")
     return Optimum(net, name, maximize, limits, tuple(attempts))
+
+
+def _unit(net: Network, functions: Mapping[str, Goal], name: str) -> str | None:
+    """That of a measure; None of a function."""
+    return None if name in functions else units_of(net, {name: Measure.read(name)})[name]
 
 
 def _ranges(net: Network, variables: Any) -> dict[str, tuple[float, float]]:

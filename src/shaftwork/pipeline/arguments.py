@@ -232,8 +232,14 @@ def range_of(name: str, span: Any, checked: Callable[[Any], float]) -> tuple[flo
     return low, high
 
 
-def checked_parameter(netlist: Netlist, name: str, value: Any) -> float:
+def checked_parameter(netlist: Netlist, name: str, value: Any, where: str = "") -> float:
     """A new value of a parameter "part.name", in SI and within its bounds.
+
+    Args:
+        netlist: of the network.
+        name: of the parameter.
+        value: the number or quantity.
+        where: it stands, in words that follow it in a message, " in row 3".
 
     Raises:
         ParameterError: there is no such parameter, or the value is not admissible.
@@ -248,7 +254,7 @@ def checked_parameter(netlist: Netlist, name: str, value: Any) -> float:
     if objection is None and not isinstance(number, float):
         objection = "must be a number here: a law is part of the network, so build another network with it"
     if objection is not None:
-        raise ParameterError(f"{type(part).__name__} '{owner}': {parameter} = {value!r} {objection}.")
+        raise ParameterError(f"{type(part).__name__} '{owner}': {parameter} = {value!r}{where} {objection}.")
     if not isinstance(part.declared[parameter].magnitude(getattr(part, parameter))[0], float):
         reason = "was not given" if getattr(part, parameter) is None else "is no number"
         raise ParameterError(

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
+from functools import partial
 from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,6 +29,8 @@ from shaftwork.pipeline.arguments import (
     repeated,
     time_span,
 )
+from shaftwork.pipeline.columns import column_in_si
+from shaftwork.pipeline.measured_units import units_of
 from shaftwork.pipeline.motion_start import ending_of, refuse_motion, time_of_start
 from shaftwork.pipeline.network import Network, network_of
 from shaftwork.results.fatigue import SNLine
@@ -78,7 +81,7 @@ def sweep(
         measures: names such as "max shaft.tau", or a mapping from names of your own to these, or to functions of a
             solution. First words are "max", "min", "peak", "mean", "rms", "end" and "damage", see
             `results.measures.KINDS`.
-        require: by measure, (low, high); None leaves a side open.
+        require: by measure, (low, high), numbers in its SI unit or quantities; None leaves a side open.
         sn: S-N line for measures of damage, or one by quantity.
         rtol: relative tolerance of a step; the absolute one beside it is `rtol` times the size of a state at a speed of
             0.001 rad/s.
@@ -101,7 +104,8 @@ def sweep(
     columns = _columns(network_of(net).netlist(), parameters, samples)
     start = _start(net, initial, steady=steady)
     readers = _readers(measures, columns)
-    limits = _limits(require, readers)
+    units = units_of(net, readers)
+    limits = _limits(require, readers, units)
     _, end = time_span(time_of_start(None, start), t_end)
     options = _options(readers, rtol, engine, start, t_eval)
     device = _device(on, precision)
@@ -110,7 +114,7 @@ def sweep(
     worker = Worker(task, device)
     values, reasons, why = _run(worker, task, _count(processes), on, store)
     errors = _errors(task, values, reasons) if told == "single" and not worker.why else {}
-    return Sweep(net.name, columns, dict(zip(readers, values.T, strict=True)), limits, reasons, why, errors)
+    return Sweep(net.name, columns, dict(zip(readers, values.T, strict=True)), limits, reasons, why, errors, units)
 
 
 def _device(on: Any, precision: str) -> Device | None:
@@ -230,10 +234,13 @@ def _columns(netlist: Netlist, parameters: Any, samples: Any) -> dict[str, Array
     table = samples if parameters is None else parameters
     if not hasattr(table, "items"):
         raise ParameterError(f"{table!r} must map parameters to their values, such as {{'shaft.c': [2e4, 3e4]}}.")
-    named = [(str(name), _plain(values)) for name, values in table.items()]
+    named = [(str(name), values) for name, values in table.items()]
     if twice := repeated(name for name, _ in named):  # a data frame may have two columns of one name
         raise ParameterError(f"There are two columns '{twice}'. Give each parameter one.")
-    checked = {name: _checked(netlist, name, values) for name, values in named}
+    checked = {
+        name: column_in_si(name, values, partial(checked_parameter, netlist, name), rows=parameters is None)
+        for name, values in named
+    }
     if not checked or not all(len(values) for values in checked.values()):
         raise ParameterError("A sweep needs at least one parameter, and a value for each.")
     if parameters is None:
@@ -258,38 +265,6 @@ def _grid(values: Mapping[str, Array]) -> dict[str, Array]:
     return {name: grid.ravel() for name, grid in zip(values, grids, strict=True)}
 
 
-def _checked(netlist: Netlist, name: str, values: Any) -> Array:
-    """(k,) values of one parameter in SI, each admissible by itself."""
-    if isinstance(values, str) or not isinstance(values, Iterable):
-        raise ParameterError(f"'{name}': {values!r} must be a sequence of values. Write [{values!r}].")
-    if not isinstance(values, np.ndarray):
-        values = list(values)
-        values = np.array(values) if all(type(value) is float for value in values) else values
-    numbers = values if isinstance(values, np.ndarray) and values.dtype == float and values.ndim == 1 else None
-    examples = values if numbers is None else _telling(numbers)
-    admissible = [checked_parameter(netlist, name, value) for value in examples]
-    return np.array(admissible if numbers is None else numbers, dtype=float)
-
-
-def _plain(values: Any) -> Any:
-    """A column of a data frame as an array."""
-    return values.to_numpy() if hasattr(values, "to_numpy") else values
-
-
-def _telling(values: Array) -> list[float]:
-    """Of many numbers those that tell whether all are admissible.
-
-    Bounds are on values and on sizes, refuse zero, or refuse what is not whole.
-    """
-    if not np.isfinite(values).all():
-        return [float(values[~np.isfinite(values)][0])]
-    ends = [values[pick(values)] for pick in (np.argmin, np.argmax)] if values.size else []
-    sizes = np.abs(values[values != 0.0])
-    smallest = values[values != 0.0][[sizes.argmin()]] if sizes.size else sizes
-    broken = values[[np.abs(values - np.round(values)).argmax()]] if values.size else values
-    return [*map(float, ends), *smallest.tolist(), *broken.tolist(), *([0.0] if sizes.size < values.size else [])]
-
-
 def _readers(measures: Measures, columns: Iterable[str]) -> dict[str, Reader]:
     """Measures by name, none of them that of another column of the table."""
     readers: dict[str, Reader] = {}
@@ -305,10 +280,12 @@ def _readers(measures: Measures, columns: Iterable[str]) -> dict[str, Reader]:
     return readers
 
 
-def _limits(require: Mapping[str, Any] | None, readers: Mapping[str, Reader]) -> dict[str, Limits]:
+def _limits(
+    require: Mapping[str, Any] | None, readers: Mapping[str, Reader], units: Mapping[str, str]
+) -> dict[str, Limits]:
     if others := [name for name in require or {} if name not in readers]:
         raise ParameterError(f"require: there is no measure '{others[0]}'. There are: {', '.join(readers)}.")
-    return limits_of(require or {})
+    return limits_of(require or {}, units.get)
 
 
 def _lines(sn: Any, readers: Mapping[str, Reader]) -> dict[str, SNLine]:

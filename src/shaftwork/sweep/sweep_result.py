@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from shaftwork.core.errors import ParameterError, imported
 from shaftwork.core.files import replaced
 from shaftwork.core.notebook import html_table
-from shaftwork.core.parameters import whole, without_unit
+from shaftwork.core.parameters import is_quantity, whole
 from shaftwork.core.screen import ROWS, counted, in_columns
+from shaftwork.pipeline.measured_units import limits_in_si
 from shaftwork.results.observer import Array
 from shaftwork.results.plotting import new_figure
 
@@ -31,29 +32,34 @@ Limits = tuple[float | None, float | None]
 """The least and the most that is allowed; None leaves a side open."""
 
 
-def limits_of(require: Mapping[str, Any]) -> dict[str, Limits]:
-    """Limits that a user gave, by name.
+def limits_of(require: Mapping[str, Any], unit_of: Callable[[str], str | None]) -> dict[str, Limits]:
+    """Limits that a user gave, by name, in SI.
+
+    Args:
+        require: numbers or quantities.
+        unit_of: the SI unit of a name, which is asked for where a limit has units; None where it is not known.
 
     Raises:
-        ParameterError: one is no pair of numbers, has units, or nothing lies between its sides.
+        ParameterError: one is no pair of numbers, has the wrong units, or nothing lies between its sides.
     """
     limits: dict[str, Limits] = {}
-    for name, pair in require.items():
-        for side in pair if isinstance(pair, tuple | list) else ():
-            without_unit(f"require['{name}']", side, "of the measure, as N m")
+    for name, given in require.items():
+        sides = given if isinstance(given, tuple | list) else [given]
+        for side in sides:
             if isinstance(side, str | bytes):
                 raise ParameterError(
-                    f"require['{name}'] = {pair!r}: {side!r} is a text. Give a number in the SI unit of the measure."
+                    f"require['{name}'] = {given!r}: {side!r} is a text. Give a number in the SI unit of the measure."
                 )
+        pair = limits_in_si(f"require['{name}']", given, unit_of(name)) if any(map(is_quantity, sides)) else given
         try:
             low, high = (None if side is None else float(side) for side in pair)
         except (TypeError, ValueError):
             raise ParameterError(
-                f"require['{name}'] = {pair!r} must be (low, high); None leaves a side open."
+                f"require['{name}'] = {given!r} must be (low, high); None leaves a side open."
             ) from None
         if not (-math.inf if low is None else low) <= (math.inf if high is None else high):
             raise ParameterError(
-                f"require['{name}'] = {pair!r}: no value is at least {low} and at most {high}. Write (low, high)."
+                f"require['{name}'] = {given!r}: no value is at least {low} and at most {high}. Write (low, high)."
             )
         limits[name] = (low, high)
     return limits
@@ -72,6 +78,7 @@ class Sweep:
         why: why variants ran one by one, and how many, where some did; empty where all ran side by side.
         errors: in single precision, by measure, how far 16 variants all over the sweep differ from double precision at
             most, as a part of the largest value of these; else empty.
+        units: by measure, SI; not of functions, whose units are not known.
     """
 
     name: str
@@ -81,6 +88,7 @@ class Sweep:
     reasons: tuple[str, ...]
     why: str = ""
     errors: Mapping[str, float] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.reasons)
@@ -94,15 +102,31 @@ class Sweep:
     def passed(self) -> NDArray[np.bool_]:
         """(k,) whether a variant did not fail and meets every requirement."""
         good = ~self.failed
-        for name, (low, high) in self.require.items():
-            good &= True if low is None else self.measures[name] >= low
-            good &= True if high is None else self.measures[name] <= high
+        for _, missed in self._missed():
+            good &= ~missed
         return good
+
+    def _missed(self) -> Iterator[tuple[str, NDArray[np.bool_]]]:
+        """Each limit in words, and (k,) which variants miss it."""
+        for name, (low, high) in self.require.items():
+            if low is not None:
+                yield f"{name} below {low:g}", ~(self.measures[name] >= low)
+            if high is not None:
+                yield f"{name} above {high:g}", ~(self.measures[name] <= high)
+
+    @property
+    def _verdicts(self) -> NDArray[np.object_]:
+        """(k,) texts: why a variant failed, else the limits that it misses; empty where it passed."""
+        texts, failed = np.array(self.reasons, dtype=object), self.failed
+        for words, missed in self._missed():
+            rows = np.flatnonzero(missed & ~failed)
+            texts[rows] = [f"{text}, {words}" if text else words for text in texts[rows]]
+        return texts
 
     @property
     def columns(self) -> dict[str, Any]:
-        """Parameters, measures, whether the requirements are met, and reasons, each a column."""
-        verdicts = self.passed, np.array(self.reasons, dtype=object)
+        """Parameters, measures, whether a variant passed, and if not, how it failed or which limits it misses."""
+        verdicts = self.passed, self._verdicts
         return {**self.parameters, **self.measures, **dict(zip(VERDICTS, verdicts, strict=True))}
 
     def table(self) -> pd.DataFrame:
@@ -110,13 +134,16 @@ class Sweep:
         frame: pd.DataFrame = imported("pandas", "data", "Sweep.table()").DataFrame(self.columns)
         return frame
 
-    def best(self, measure: str, count: int | None = None, *, largest: bool = False) -> Sweep:
+    def best(
+        self, measure: str, count: int | None = None, *, largest: bool = False, ignore_require: bool = False
+    ) -> Sweep:
         """The variants that meet the requirements, ranked.
 
         Args:
             measure: by which; the smallest comes first.
             count: how many at most.
             largest: the largest comes first.
+            ignore_require: whether variants that miss a requirement are ranked too, all but those that failed.
 
         Raises:
             ParameterError: there is no such measure, or the count is no number of variants.
@@ -125,7 +152,7 @@ class Sweep:
             raise ParameterError(f"There is no measure '{measure}'. There are: {', '.join(self.measures)}.")
         if count is not None and whole(count) is None:
             raise ParameterError(f"count = {count!r} must be a number, 1 or more; leave it out for all that pass.")
-        rows = np.flatnonzero(self.passed)
+        rows = np.flatnonzero(~self.failed if ignore_require else self.passed)
         values = self.measures[measure][rows]
         return self.rows(rows[np.argsort(-values if largest else values, kind="stable")][:count])
 
@@ -140,6 +167,7 @@ class Sweep:
             tuple(self.reasons[k] for k in taken.tolist()),
             self.why,
             self.errors,
+            self.units,
         )
 
     def to_csv(self, path: str | Path) -> None:
@@ -173,13 +201,13 @@ class Sweep:
 
     def _rows(self, count: int) -> tuple[str, list[str], list[list[str]]]:
         """What is said of all variants, and headings and cells of the first ones."""
-        columns, passed = {**self.parameters, **self.measures}, self.passed
+        columns, passed, why = {**self.parameters, **self.measures}, self.passed, self._verdicts
         rows = [
             [
                 f"{k}",
                 *(f"{values[k]:z.6g}" for values in columns.values()),
                 "yes" if passed[k] else "no",
-                self.reasons[k],
+                why[k],
             ]
             for k in range(min(len(self), count))
         ]
@@ -188,7 +216,7 @@ class Sweep:
         if self.errors:
             parts = ", ".join(f"{name} {error:.0e}" for name, error in self.errors.items())
             counts = f"{counts}; off by single precision: {parts}"
-        return counts, ["", *columns, "passed", "reason" if any(self.reasons) else ""], rows
+        return counts, ["", *columns, "passed", "reason" if any(why) else ""], rows
 
     def __str__(self) -> str:
         counts, header, rows = self._rows(ROWS)

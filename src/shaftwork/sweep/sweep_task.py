@@ -122,7 +122,7 @@ class Worker:
     Raises:
         NetworkError: the network cannot be assembled.
         ParameterError: the start values are no mapping.
-        SignalError: a measure or a start value is of a quantity that does not exist.
+        SignalError: a start value is of a quantity that does not exist.
     """
 
     def __init__(self, task: Task, device: Device | None = None) -> None:
@@ -143,9 +143,7 @@ class Worker:
         initial = self._task.options["initial"] or {}
         if not isinstance(initial, Mapping):
             raise ParameterError(f"initial = {initial!r} must map quantities to values, such as {{'J1.omega': 3.0}}.")
-        read = [reader.quantity for reader in self._task.measures.values() if isinstance(reader, Measure)]
-        start_names = () if isinstance(initial, Ending) else map(str, initial)
-        for quantity in (*read, *start_names):
+        for quantity in () if isinstance(initial, Ending) else map(str, initial):
             if quantity not in {**observer.units, **observer.profiles}:
                 raise no_quantity(quantity, self._model.name, observer.units)
 

@@ -14,7 +14,7 @@ from shaftwork.core.screen import progress
 from shaftwork.pipeline.network import Network, network_of
 from shaftwork.results.observer import Array, array_in_si
 from shaftwork.results.plotting import new_figure, plain
-from shaftwork.uncertainty.draws import Design, Distribution
+from shaftwork.uncertainty.draws import Design, Distribution, distributions_in_si
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -112,7 +112,7 @@ def bands(
         raise ParameterError("t must be times in s that ascend, such as np.linspace(0.0, 1.0, 101).")
     if not 0.0 < level < 1.0:
         raise ParameterError(f"level = {level!r} must lie between 0 and 1.")
-    columns = _columns(distributions, samples, seed)
+    columns = _columns(distributions_in_si(net, distributions), samples, seed)
     count = len(next(iter(columns.values())))
     if count < 2:
         raise ParameterError("A band needs two samples or more.")
@@ -130,8 +130,8 @@ def bands(
 
 
 def _columns(distributions: Mapping[str, Distribution], samples: int | None, seed: int) -> Mapping[str, Array]:
-    if samples is None and len(distributions) == 1:
-        ((name, values),) = distributions.items()
-        if isinstance(values, Sequence | np.ndarray) and not isinstance(values, str | tuple):
-            return {str(name): np.asarray(values, dtype=float)}
+    """Samples by parameter; of one list alone each value once."""
+    ((name, values), *others) = distributions.items()
+    if samples is None and not others and isinstance(values, np.ndarray):
+        return {name: values}
     return Design(distributions, "random", 100 if samples is None else samples, seed).columns

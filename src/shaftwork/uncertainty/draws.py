@@ -2,51 +2,89 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.core.errors import ParameterError, imported
-from shaftwork.core.parameters import whole
+from shaftwork.core.parameters import in_si, whole
+from shaftwork.pipeline.arguments import checked_parameter
+from shaftwork.pipeline.columns import Checked, column_in_si, has_many
+from shaftwork.pipeline.network import Network, network_of
 from shaftwork.results.observer import Array
 
 METHODS = ("random", "sobol", "morris")
 Distribution = Any
-"""A frozen distribution of scipy.stats, (low, high) for a uniform one, or a list of values that are equally likely."""
+"""A frozen distribution of scipy.stats, (low, high) for a uniform one, or a list of values that are equally likely.
+
+Values of pairs and lists may have units.
+"""
 
 
-def quantiles(name: str, distribution: Distribution, shares: Array, ends: tuple[float, float]) -> Array:
-    """(k,) values of a parameter at shares (k,) of its distribution.
+def distributions_in_si(net: Network | None, distributions: Mapping[str, Distribution]) -> dict[str, Distribution]:
+    """Distributions as a user gave them: pairs and lists become numbers in SI, lists arrays.
 
-    Shares of `ends` stand for 0 and 1 where the distribution has no end.
+    Args:
+        net: whose parameters they are; None where the names are those of a function's columns, which have no units.
+        distributions: by parameter. Those of scipy.stats are in SI.
 
     Raises:
-        ParameterError: it is no distribution.
+        ParameterError: there is none, one is no distribution, there is no such parameter, or a value of a pair or list
+            is not admissible.
     """
-    if hasattr(distribution, "ppf"):
-        # a grid of shares goes to the ends, which some distributions do not have
-        inside = shares if np.isfinite(distribution.ppf([0.0, 1.0])).all() else np.clip(shares, *ends)
-        values = np.asarray(distribution.ppf(inside), dtype=float)
-        return np.clip(values, *distribution.support()) if hasattr(distribution, "support") else values
-    if isinstance(distribution, tuple):
-        if len(distribution) == 2 and distribution[0] < distribution[1]:
-            return np.asarray(distribution[0] + shares * (distribution[1] - distribution[0]))
-    elif isinstance(distribution, Sequence | np.ndarray) and not isinstance(distribution, str) and len(distribution):
-        values = np.asarray(distribution, dtype=float)
-        return np.asarray(values[np.minimum((shares * len(values)).astype(int), len(values) - 1)])
+    if not (isinstance(distributions, Mapping) and distributions):
+        raise ParameterError("Nothing is uncertain. Give distributions, such as {'shaft.c': (20e3, 28e3)}.")
+    netlist = None if net is None else network_of(net).netlist()
+
+    def checked(name: str) -> Checked:
+        return partial(_of_function, name) if netlist is None else partial(checked_parameter, netlist, name)
+
+    return {str(name): _in_si(str(name), given, checked(str(name))) for name, given in distributions.items()}
+
+
+def _of_function(name: str, value: Any, _: str) -> float:
+    return in_si(f"'{name}'", value)
+
+
+def _in_si(name: str, given: Any, checked: Checked) -> Distribution:
+    if hasattr(given, "ppf"):
+        return given
+    if isinstance(given, tuple):
+        ends = [checked(end, "") for end in given]
+        if len(ends) == 2 and ends[0] < ends[1]:
+            return tuple(ends)
+    elif has_many(given) and (values := column_in_si(name, given, checked)).size:
+        return values
     raise ParameterError(
-        f"'{name}': {distribution!r} is no distribution. Give one of scipy.stats, such as norm(24e3, 500), (low, high) "
+        f"'{name}': {given!r} is no distribution. Give one of scipy.stats, such as norm(24e3, 500), (low, high) "
         "for values that are all as likely, or a list of values."
     )
+
+
+def _quantiles(distribution: Distribution, shares: Array, ends: tuple[float, float]) -> Array:
+    """(k,) values at shares (k,) of a distribution.
+
+    Shares of `ends` stand for 0 and 1 where the distribution has no end.
+    """
+    if isinstance(distribution, tuple):
+        low, high = distribution
+        return np.asarray(low + shares * (high - low))
+    if isinstance(distribution, np.ndarray):
+        return np.asarray(distribution[np.minimum((shares * distribution.size).astype(int), distribution.size - 1)])
+    # a grid of shares goes to the ends, which some distributions do not have
+    inside = shares if np.isfinite(distribution.ppf([0.0, 1.0])).all() else np.clip(shares, *ends)
+    values = np.asarray(distribution.ppf(inside), dtype=float)
+    return np.clip(values, *distribution.support()) if hasattr(distribution, "support") else values
 
 
 class Design:
     """The samples of a study.
 
     Args:
-        distributions: by parameter.
+        distributions: by parameter, as of `distributions_in_si`.
         method: one of `METHODS`.
         samples: independent ones; of "sobol" with so many more for each parameter, of "morris" trajectories.
         seed: of the random numbers.
@@ -59,16 +97,14 @@ class Design:
     def __init__(self, distributions: Mapping[str, Distribution], method: str, samples: int, seed: int) -> None:
         if method not in METHODS:
             raise ParameterError(f"There is no method {method!r}. Take one of: {', '.join(METHODS)}.")
-        if not (isinstance(distributions, Mapping) and distributions):
-            raise ParameterError("Nothing is uncertain. Give distributions, such as {'shaft.c': (20e3, 28e3)}.")
         if whole(samples) is None or samples < 2:
             raise ParameterError(f"samples = {samples!r} must be a whole number, 2 or more.")
-        self.names, self.method, self.count, self.seed = tuple(map(str, distributions)), method, int(samples), seed
+        self.names, self.method, self.count, self.seed = tuple(distributions), method, int(samples), seed
         if method == "sobol" and self.count & (self.count - 1):
             raise ParameterError(f"samples = {samples} must be a power of two for Sobol' indices, such as 1024.")
         shares = self._shares()
         self.columns = {
-            name: quantiles(name, distribution, column, (0.01, 0.99) if method == "morris" else (0.0, 1.0))
+            name: _quantiles(distribution, column, (0.01, 0.99) if method == "morris" else (0.0, 1.0))
             for (name, distribution), column in zip(distributions.items(), shares.T, strict=True)
         }
         """(rows,) values by parameter."""

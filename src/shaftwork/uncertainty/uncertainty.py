@@ -12,7 +12,7 @@ from shaftwork.pipeline.network import Network
 from shaftwork.results.observer import Array
 from shaftwork.sweep.sweep import Measures, sweep
 from shaftwork.sweep.sweep_result import Sweep
-from shaftwork.uncertainty.draws import Design, Distribution
+from shaftwork.uncertainty.draws import Design, Distribution, distributions_in_si
 from shaftwork.uncertainty.uncertainty_result import Uncertainty
 
 Columns = Mapping[str, Array]
@@ -40,7 +40,7 @@ def uncertainty(
     Args:
         net: the network; or a function from columns of samples by parameter to columns of results by measure.
         distributions: by parameter, a frozen one of scipy.stats, (low, high) for a uniform one, or a list of values
-            that are equally likely, such as the seeds of a noise.
+            that are equally likely, such as the seeds of a noise. Values of pairs and lists may have units.
         measures: as in `sweep`.
         samples: how many; of "sobol" a power of two, and as many for each parameter and twice more are simulated; of
             "morris" the trajectories, each of one motion more than there are parameters.
@@ -55,7 +55,8 @@ def uncertainty(
     """
     if not 0.0 < level < 1.0:
         raise ParameterError(f"level = {level!r} must lie between 0 and 1.")
-    design = Design(distributions, method, samples, seed)
+    known = distributions_in_si(net if isinstance(net, Network) else None, distributions)
+    design = Design(known, method, samples, seed)
     if isinstance(net, Network):
         if measures is None:
             raise ParameterError("Name what is measured, measures=['max shaft.tau'].")

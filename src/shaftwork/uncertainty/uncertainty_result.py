@@ -11,8 +11,9 @@ from scipy import stats
 
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.notebook import html_table
-from shaftwork.core.parameters import in_si, without_unit
+from shaftwork.core.parameters import in_si
 from shaftwork.core.screen import counted, in_columns
+from shaftwork.pipeline.measured_units import limits_in_si
 from shaftwork.results.observer import Array
 from shaftwork.results.plotting import new_figure, plain
 from shaftwork.sweep.sweep_result import Sweep
@@ -92,21 +93,22 @@ class Uncertainty:
 
         Args:
             measure: its name.
-            above: upper limit.
+            above: upper limit, in the SI unit of the measure or with units.
             below: lower limit.
 
         Raises:
-            ParameterError: there is no such measure or no limit, or a limit is no finite number.
+            ParameterError: there is no such measure or no limit, or a limit is no finite number or has the wrong
+                unit.
         """
         if above is None and below is None:
             raise ParameterError("Give a limit, above=... or below=....")
         self.values(measure)
         rows = self.design.independent
-        values = self._column(measure)[rows]
+        values, unit = self._column(measure)[rows], self.sweep.units.get(measure)
         passing = np.zeros(rows.size, dtype=bool)
         for name, limit, passed in (("above", above, np.greater), ("below", below, np.less)):
             if limit is not None:
-                passing |= passed(values, in_si(name, without_unit(name, limit, "of the measure, as N m")))
+                passing |= passed(values, in_si(name, limits_in_si(name, limit, unit)))
         most = int((passing | self.sweep.failed[rows]).sum())
         low, high = (
             stats.binomtest(count, rows.size).proportion_ci(self.level) for count in (int(passing.sum()), most)
