@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import pytest
 
@@ -99,8 +101,62 @@ def test_where_no_design_meets_the_limits_the_error_says_how_near_they_came() ->
     made = sw.optimize(
         axis(), {"gear.ratio": (2.0, 60.0)}, "max JM.omega", t_end=1.0, require={"end JL.omega": (9.0, None)}
     )
-    with pytest.raises(sw.SimulationError, match=r"end JL\.omega must be within"):
+    with pytest.raises(sw.SimulationError, match=r"end JL\.omega must be at least 9 and is 5\."):
         _ = made.best
+
+
+def test_of_limits_that_no_value_meets_the_error_names_the_worst_first() -> None:
+    # at the ratio 20 the load turns up to 5 rad/s and the motor to 100: 4 short of 9, and 5 times 20
+    made = sw.optimize(
+        axis(),
+        {"gear.ratio": (20.0, 60.0)},
+        "max JM.omega",
+        t_end=1.0,
+        require={"end JL.omega": (9.0, None), "max JM.omega": (None, 20.0)},
+    )
+    with pytest.raises(
+        sw.SimulationError, match=r"max JM\.omega must be at most 20 and is.*; end JL\.omega must be at"
+    ):
+        _ = made.best
+
+
+def test_a_descent_whose_limit_no_value_meets_ends_soon() -> None:
+    """Its slope has a jump: towards the limit, and back to the goal, it would go on for thousands of designs."""
+    asked: list[float] = []
+
+    def price(values: Mapping[str, float]) -> float:
+        asked.append(values["gear.ratio"])
+        return values["gear.ratio"]
+
+    made = sw.optimize(
+        axis(),
+        {"gear.ratio": (2.0, 60.0)},
+        price,
+        t_end=1.0,
+        functions={"torque": lambda values: 400.0 - 0.1 * min(values["gear.ratio"], 40.0)},
+        require={"torque": (None, 100.0)},
+    )
+    assert "the last 30 of them no better" in made.attempts[0].message
+    assert len(asked) < 3 * 60  # 30 designs after the best, each with two for the slope
+    with pytest.raises(sw.SimulationError, match=r"torque must be at most 100 and is 396\."):
+        _ = made.best
+
+
+def test_nothing_is_asked_outside_the_ranges() -> None:
+    low, high = 0.0, 3.0
+    asked: list[float] = []
+
+    def price(values: Mapping[str, float]) -> float:
+        asked.append(values["coupling.gap"])
+        return -((values["coupling.gap"] - 1.0) ** 2)  # least at the upper end, and at the lower one from below 1
+
+    net = axis()
+    net.add(sw.Backlash("coupling", gap=0.5, c=100.0), "drum", "load")
+    net.add(sw.Inertia("J load", J=1.0), "load")
+    made = sw.optimize(net, {"coupling.gap": (low, high)}, price, t_end=0.1, starts=3)
+    assert made.values["coupling.gap"] == high
+    assert min(asked) == low  # a start of the middle of the lower part comes there
+    assert max(asked) == high
 
 
 @pytest.mark.parametrize(

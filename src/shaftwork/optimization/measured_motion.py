@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,7 @@ class MeasuredMotion:
 
     Args:
         net: the network.
-        names: of the variables.
+        ranges: (low, high) by variable; nothing is asked outside them.
         goals: by name.
         t_end: end of the motion, s.
         initial: start values of states.
@@ -35,17 +35,20 @@ class MeasuredMotion:
     def __init__(
         self,
         net: Network,
-        names: Sequence[str],
+        ranges: Mapping[str, tuple[float, float]],
         goals: Mapping[str, Goal],
         t_end: float,
         initial: Mapping[str, float] | None,
         rtol: float,
     ) -> None:
-        self._names, self._goals = tuple(names), goals
+        self._names, self._goals = tuple(ranges), goals
+        self._low, self._high = np.array(list(ranges.values())).T
         self._read = {name: Measure.read(goal) for name, goal in goals.items() if isinstance(goal, str)}
         self._integrands = [item for one in self._read.values() if (item := integrand(one)) is not None]
         quantities = tuple(dict.fromkeys(one.quantity for one in self._read.values()))
-        self._motion = ParametricMotion(net.compile(), quantities, self._integrands, names, (0.0, t_end), initial, rtol)
+        self._motion = ParametricMotion(
+            net.compile(), quantities, self._integrands, self._names, (0.0, t_end), initial, rtol
+        )
         self._fixed = self._motion.model.parameters
         self._last: tuple[bytes, dict[str, tuple[float, Array]]] = b"", {}
         self._failure = ""
@@ -97,8 +100,11 @@ class MeasuredMotion:
     def _differences(self, measure: Measure, values: Mapping[str, float]) -> Array:
         at = np.array(list(values.values()))
         steps = 1e-4 * np.where(at == 0.0, 1.0, np.abs(at))  # measures are known to some 1e-9
-        slopes = differences(lambda x: np.array([measure.of(self._motion.motion(self.values(x)).solution)]), at, steps)
-        return np.asarray(slopes[0])
+        return self._slopes(lambda x: measure.of(self._motion.motion(self.values(x)).solution), at, steps)
+
+    def _slopes(self, value: Callable[[Array], float], at: Array, steps: Array) -> Array:
+        """(m,) derivatives of a value, by differences within the ranges."""
+        return np.asarray(differences(lambda x: np.array([value(x)]), at, steps, self._low, self._high)[0])
 
     def _of_parameters(
         self, name: str, goal: Callable[[Mapping[str, float]], float], variables: Array
@@ -119,12 +125,12 @@ class MeasuredMotion:
                     f"The function '{name}' gives {result!r} at {in_words(self.values(at))}. It must give a number."
                 ) from None
 
-        def finite(at: Array) -> Array:
+        def finite(at: Array) -> float:
             if not np.isfinite(result := value(at)):
                 raise SimulationError(f"The function '{name}' is {result:g} at {in_words(self.values(at))}.")
-            return np.array([result])
+            return result
 
         if not np.isfinite(here := value(variables)):
             return here, np.zeros(variables.size)
         steps = 1e-6 * np.where(variables == 0.0, 1.0, np.abs(variables))
-        return here, differences(finite, variables, steps)[0]
+        return here, self._slopes(finite, variables, steps)

@@ -8,14 +8,13 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.parameters import whole
 from shaftwork.core.screen import progress
 from shaftwork.numerics.even_points import even_points
-from shaftwork.numerics.tolerances import TYPED
+from shaftwork.optimization.descent import Descent
 from shaftwork.optimization.measured_motion import Goal, MeasuredMotion
 from shaftwork.optimization.optimum import Attempt, Optimum
 from shaftwork.pipeline.arguments import checked_parameter, range_of, relative_tolerance, time_span
@@ -86,11 +85,10 @@ def optimize(
     with progress(len(taken) * starts, "starts", "compiling") as show:
         for choice, values in taken:
             chosen = with_values(net, values) if values else net
-            motion = MeasuredMotion(chosen, tuple(ranges), goals, end, initial, relative_tolerance(rtol))
+            motion = MeasuredMotion(chosen, ranges, goals, end, initial, relative_tolerance(rtol))
             for start in _starts(chosen, ranges, starts, seed):
-                attempts.append(
-                    _attempt(motion, choice, values, start, ranges, limits, -1.0 if maximize else 1.0, name)
-                )
+                descent = Descent(motion, ranges, limits, name, -1.0 if maximize else 1.0)
+                attempts.append(_attempt(motion, choice, values, start, descent))
                 show(len(attempts), "optimize")
     return Optimum(net, name, maximize, limits, tuple(attempts))
 
@@ -156,45 +154,10 @@ def _attempt(
     choice: Mapping[str, int],
     fixed: Mapping[str, float],
     start: Array,
-    ranges: Mapping[str, tuple[float, float]],
-    limits: Mapping[str, Limits],
-    sign: float,
-    name: str,
+    descent: Descent,
 ) -> Attempt:
-    """One descent, in shares of the ranges; goals by their sizes at the start."""
-    low, high = np.array(list(ranges.values())).T
-    width, before = high - low, motion.motions
-    first = {of: value for of, (value, _) in motion.at(start).items()}
-    if reason := motion.undefined(start):
-        return Attempt(choice, {**fixed, **motion.values(start)}, first, reason, motion.motions - before)
-    sizes = {
-        of: max(map(abs, (value, *(end or 0.0 for end in limits.get(of, ()))))) or 1.0 for of, value in first.items()
-    }
-
-    def side(of: str, factor: float, level: float = 0.0) -> dict[str, Any]:
-        def value(shares: Array) -> float:
-            value = motion.at(low + shares * width)[of][0]
-            if not np.isfinite(value):  # no motion, or no number: as bad as can be, and finite for the line search
-                return 1e6 if of == name else -1e6
-            return factor * (value - level) / sizes[of]
-
-        def slope(shares: Array) -> Array:
-            return np.asarray(factor * motion.at(low + shares * width)[of][1] * width / sizes[of])
-
-        return {"type": "ineq", "fun": value, "jac": slope}
-
-    sides = [(of, 1.0, ends[0]) for of, ends in limits.items()] + [(of, -1.0, ends[1]) for of, ends in limits.items()]
-    aim = side(name, sign)
-    result = minimize(
-        aim["fun"],
-        (start - low) / width,
-        jac=aim["jac"],
-        bounds=[(0.0, 1.0)] * len(ranges),
-        constraints=[side(of, factor, level) for of, factor, level in sides if level is not None],
-        method="SLSQP",
-        options={"ftol": TYPED, "maxiter": 200},
-    )
-    variables = low + np.clip(result.x, 0.0, 1.0) * width
+    before = motion.motions
+    variables, message = (start, "") if motion.undefined(start) else descent.run(start)
     goals = {of: value for of, (value, _) in motion.at(variables).items()}
-    message = motion.undefined(variables) or str(result.message)
+    message = motion.undefined(variables) or message
     return Attempt(choice, {**fixed, **motion.values(variables)}, goals, message, motion.motions - before)

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from operator import itemgetter
 
 import numpy as np
 
 from shaftwork.core.errors import SimulationError
 from shaftwork.core.notebook import html_table
 from shaftwork.core.screen import counted, in_columns
+from shaftwork.numerics.tolerances import EQUAL
 from shaftwork.pipeline.network import Network, with_values
 from shaftwork.sweep.sweep_result import Limits
 
@@ -59,14 +61,7 @@ class Optimum:
 
     def meets(self, attempt: Attempt) -> bool:
         """Whether a design is within all limits, to a millionth of their size."""
-        if not attempt.complete:
-            return False
-        for name, (low, high) in self.require.items():
-            value = attempt.goals[name]
-            margin = 1e-6 * max((abs(end) for end in (low, high) if end is not None), default=0.0)
-            if not (low is None or value >= low - margin) or not (high is None or value <= high + margin):
-                return False
-        return True
+        return attempt.complete and not missed(self.require, attempt.goals)
 
     @cached_property
     def best(self) -> Attempt:
@@ -90,12 +85,12 @@ class Optimum:
                 f"None of {count} has a design with all goals: {undefined[0]}. Give functions that are numbers in the "
                 "whole ranges, narrower ranges, or more starts."
             )
-        nearest = [
-            f"{name} must be within {limits} and is from {min(a.goals[name] for a in complete):.6g} to "
-            f"{max(a.goals[name] for a in complete):.6g}"
-            for name, limits in self.require.items()
-        ]
-        said = "; ".join([*nearest, *undefined])
+        nearest = min(complete, key=lambda a: max(missed(self.require, a.goals).values()))
+        misses = "; ".join(
+            f"{name} must be {self._limits(name)} and is {nearest.goals[name]:.6g}"
+            for name in missed(self.require, nearest.goals)
+        )
+        said = "; ".join([f"the nearest has {in_words(nearest.values)}, where {misses}", *undefined])
         return f"None of {count} meets all limits: {said}. Widen a range or a limit, or take more starts."
 
     @property
@@ -121,8 +116,9 @@ class Optimum:
         return title, ["", "best", ""], rows
 
     def _said(self, name: str) -> str:
-        if name not in self.require:
-            return "goal"
+        return self._limits(name) if name in self.require else "goal"
+
+    def _limits(self, name: str) -> str:
         low, high = self.require[name]
         words = [f"at least {low:g}"] if low is not None else []
         return " and ".join([*words, *([f"at most {high:g}"] if high is not None else [])])
@@ -133,6 +129,17 @@ class Optimum:
 
     def _repr_html_(self) -> str:
         return html_table(*self._rows())
+
+
+def missed(require: Mapping[str, Limits], goals: Mapping[str, float]) -> dict[str, float]:
+    """By how much a limit is missed, in its size, by goal; the worst first, and none that is met to a millionth."""
+    misses = dict[str, float]()
+    for name, (low, high) in require.items():
+        beyond = max(0.0 if low is None else low - goals[name], 0.0 if high is None else goals[name] - high)
+        size = max((abs(end) for end in (low, high) if end is not None and np.isfinite(end)), default=0.0)
+        if beyond > EQUAL * size:
+            misses[name] = beyond / (size or 1.0)
+    return dict(sorted(misses.items(), key=itemgetter(1), reverse=True))
 
 
 def in_words(values: Mapping[str, float]) -> str:
