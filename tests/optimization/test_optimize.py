@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
+import sympy
 
 import shaftwork as sw
 
@@ -140,6 +141,25 @@ def test_a_descent_whose_limit_no_value_meets_ends_soon() -> None:
     assert len(asked) < 3 * 60  # 30 designs after the best, each with two for the slope
     with pytest.raises(sw.SimulationError, match=r"torque must be at most 100 and is 396\."):
         _ = made.best
+
+
+def test_each_design_can_start_in_its_own_steady_state() -> None:
+    """From rest under a push an undamped step of 5 N m adds 10; from a twist of nothing the push would count twice."""
+    net = sw.Network("pushed")
+    net.add(sw.TorqueSource("push", tau=4.0), "a")
+    net.add(sw.TorqueSource("step", tau=5.0 * sympy.Heaviside(sw.t - 0.1)), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.Spring("shaft", c=1e3), "a", "ground")
+    best = sw.optimize(
+        net,
+        {"push.tau": (1.0, 50.0)},
+        lambda values: values["push.tau"],
+        t_end=0.5,  # one swing lasts 0.2 s
+        maximize=True,
+        require={"max shaft.tau": (None, 40.0)},
+        steady=True,
+    )
+    assert best.values["push.tau"] == pytest.approx(30.0, rel=1e-5)  # differences are of motions to 1e-8
 
 
 def test_nothing_is_asked_outside_the_ranges() -> None:

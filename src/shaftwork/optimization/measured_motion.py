@@ -12,7 +12,9 @@ from shaftwork.core.errors import NetworkError, ParameterError, SimulationError,
 from shaftwork.numerics.differences import differences
 from shaftwork.optimization.optimum import in_words
 from shaftwork.pipeline.network import Network
+from shaftwork.pipeline.settled import steady_start
 from shaftwork.results.measures import Measure
+from shaftwork.results.solution import Solution
 from shaftwork.sensitivities.parametric_motion import ParametricMotion
 from shaftwork.sensitivities.sensitivities import integrand, measured
 
@@ -30,6 +32,8 @@ class MeasuredMotion:
         t_end: end of the motion, s.
         initial: start values of states.
         rtol: relative tolerance of the gradients.
+        steady: whether the motion starts in the steady state at t = 0, of which `initial` changes some values. It moves
+            with the variables, so gradients are differences then.
     """
 
     def __init__(
@@ -40,16 +44,21 @@ class MeasuredMotion:
         t_end: float,
         initial: Mapping[str, float] | None,
         rtol: float,
+        *,
+        steady: bool,
     ) -> None:
         self._names, self._goals = tuple(ranges), goals
         self._low, self._high = np.array(list(ranges.values())).T
         self._read = {name: Measure.read(goal) for name, goal in goals.items() if isinstance(goal, str)}
         self._integrands = [item for one in self._read.values() if (item := integrand(one)) is not None]
+        self._model, self._t_end, self._initial, self._rtol = net.compile(), t_end, initial, rtol
         quantities = tuple(dict.fromkeys(one.quantity for one in self._read.values()))
-        self._motion = ParametricMotion(
-            net.compile(), quantities, self._integrands, self._names, (0.0, t_end), initial, rtol
+        self._motion = (
+            None
+            if steady
+            else ParametricMotion(self._model, quantities, self._integrands, self._names, (0.0, t_end), initial, rtol)
         )
-        self._fixed = self._motion.model.parameters
+        self._fixed = self._model.parameters
         self._last: tuple[bytes, dict[str, tuple[float, Array]]] = b"", {}
         self._failure = ""
         """Why there is no motion for the last variables; empty where there is."""
@@ -89,22 +98,35 @@ class MeasuredMotion:
         return results
 
     def _measures(self, values: Mapping[str, float]) -> dict[str, tuple[float, Array]]:
+        if self._motion is None:
+            return self._by_differences(self._from_steady(values), values)
         motion = self._motion.motion(values)
         try:
             slopes = self._motion.slopes(motion, values)
             integrals = dict(zip(self._integrands, slopes.integrals(), strict=True))
             return {name: measured(one, motion.solution, slopes, integrals) for name, one in self._read.items()}
         except SimulationError:  # no derivative just there: two extremes of one height, or a stop that is only touched
-            return {name: (one.of(motion.solution), self._differences(one, values)) for name, one in self._read.items()}
+            return self._by_differences(motion.solution, values)
 
-    def _differences(self, measure: Measure, values: Mapping[str, float]) -> Array:
+    def _from_steady(self, values: Mapping[str, float]) -> Solution:
+        initial = steady_start(self._model, self._initial or {}, values)
+        rtol = max(1e-2 * self._rtol, 1e-13)  # no engine takes less
+        return self._model.simulate(self._t_end, initial=initial, parameters=values, rtol=rtol, t_eval="steps")
+
+    def _by_differences(self, solution: Solution, values: Mapping[str, float]) -> dict[str, tuple[float, Array]]:
+        """All measures of the motion for some values, with slopes by motions beside it."""
+
+        def all_of(solution: Solution) -> Array:
+            return np.array([measure.of(solution) for measure in self._read.values()])
+
+        def beside(at: Array) -> Array:
+            near = self.values(at)
+            return all_of(self._from_steady(near) if self._motion is None else self._motion.motion(near).solution)
+
         at = np.array(list(values.values()))
         steps = 1e-4 * np.where(at == 0.0, 1.0, np.abs(at))  # measures are known to some 1e-9
-        return self._slopes(lambda x: measure.of(self._motion.motion(self.values(x)).solution), at, steps)
-
-    def _slopes(self, value: Callable[[Array], float], at: Array, steps: Array) -> Array:
-        """(m,) derivatives of a value, by differences within the ranges."""
-        return np.asarray(differences(lambda x: np.array([value(x)]), at, steps, self._low, self._high)[0])
+        slopes = differences(beside, at, steps, self._low, self._high)
+        return dict(zip(self._read, zip(all_of(solution).tolist(), slopes, strict=True), strict=True))
 
     def _of_parameters(
         self, name: str, goal: Callable[[Mapping[str, float]], float], variables: Array
@@ -125,12 +147,12 @@ class MeasuredMotion:
                     f"The function '{name}' gives {result!r} at {in_words(self.values(at))}. It must give a number."
                 ) from None
 
-        def finite(at: Array) -> float:
+        def finite(at: Array) -> Array:
             if not np.isfinite(result := value(at)):
                 raise SimulationError(f"The function '{name}' is {result:g} at {in_words(self.values(at))}.")
-            return result
+            return np.array([result])
 
         if not np.isfinite(here := value(variables)):
             return here, np.zeros(variables.size)
         steps = 1e-6 * np.where(variables == 0.0, 1.0, np.abs(variables))
-        return here, self._slopes(finite, variables, steps)
+        return here, differences(finite, variables, steps, self._low, self._high)[0]

@@ -18,7 +18,11 @@ from shaftwork.optimization.descent import Descent
 from shaftwork.optimization.measured_motion import Goal, MeasuredMotion
 from shaftwork.optimization.optimum import Attempt, Optimum
 from shaftwork.pipeline.arguments import checked_parameter, range_of, relative_tolerance, time_span
+<<<<<<< HEAD
 from shaftwork.pipeline.measured_units import units_of
+=======
+from shaftwork.pipeline.motion_start import refuse_motion
+>>>>>>> h-opt
 from shaftwork.pipeline.network import Network, network_of, with_values
 from shaftwork.results.measures import Measure
 from shaftwork.sweep.sweep_result import Limits, limits_of
@@ -41,6 +45,7 @@ def optimize(
     seed: int = 0,
     initial: Mapping[str, float] | None = None,
     rtol: float = 1e-6,
+    steady: bool = False,
 ) -> Optimum:
     """Find values of design variables for which a measure of the motion becomes least, or largest.
 
@@ -62,6 +67,8 @@ def optimize(
         seed: of the further starts.
         initial: start values of states.
         rtol: relative tolerance of the gradients.
+        steady: whether each motion starts in its own steady state at t = 0, of which `initial` changes some values. The
+            gradients are differences then, of two more motions for each variable.
 
     Raises:
         ParameterError: an argument is out of its range, or a measure has no derivative.
@@ -72,7 +79,12 @@ def optimize(
         raise ParameterError(f"starts = {starts!r} must be a whole number, 1 or more.")
     if OBJECTIVE in (functions or {}):
         raise ParameterError(f"'{OBJECTIVE}' is the name of the goal. Give the function another one.")
+<<<<<<< HEAD
     limits = limits_of(require or {}, partial(_unit, net, functions or {}))
+=======
+    refuse_motion(initial, "optimize")
+    limits = limits_of(require or {})
+>>>>>>> h-opt
     if unused := [other for other in functions or {} if other not in limits]:
         raise ParameterError(
             f"'{unused[0]}' is a function without limits. Give require={{'{unused[0]}': (low, high)}}."
@@ -85,7 +97,7 @@ def optimize(
     with progress(len(taken) * starts, "starts", "compiling") as show:
         for choice, values in taken:
             chosen = with_values(net, values) if values else net
-            motion = MeasuredMotion(chosen, ranges, goals, end, initial, relative_tolerance(rtol))
+            motion = MeasuredMotion(chosen, ranges, goals, end, initial, relative_tolerance(rtol), steady=steady)
             for start in _starts(chosen, ranges, starts, seed):
                 descent = Descent(motion, ranges, limits, name, -1.0 if maximize else 1.0)
                 attempts.append(_attempt(motion, choice, values, start, descent))
