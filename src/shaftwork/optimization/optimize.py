@@ -18,11 +18,8 @@ from shaftwork.optimization.descent import Descent
 from shaftwork.optimization.measured_motion import Goal, MeasuredMotion
 from shaftwork.optimization.optimum import Attempt, Optimum
 from shaftwork.pipeline.arguments import checked_parameter, range_of, relative_tolerance, time_span
-<<<<<<< HEAD
 from shaftwork.pipeline.measured_units import units_of
-=======
 from shaftwork.pipeline.motion_start import refuse_motion
->>>>>>> h-opt
 from shaftwork.pipeline.network import Network, network_of, with_values
 from shaftwork.results.measures import Measure
 from shaftwork.sweep.sweep_result import Limits, limits_of
@@ -79,12 +76,8 @@ def optimize(
         raise ParameterError(f"starts = {starts!r} must be a whole number, 1 or more.")
     if OBJECTIVE in (functions or {}):
         raise ParameterError(f"'{OBJECTIVE}' is the name of the goal. Give the function another one.")
-<<<<<<< HEAD
-    limits = limits_of(require or {}, partial(_unit, net, functions or {}))
-=======
     refuse_motion(initial, "optimize")
-    limits = limits_of(require or {})
->>>>>>> h-opt
+    limits = limits_of(require or {}, partial(_unit, net, functions or {}))
     if unused := [other for other in functions or {} if other not in limits]:
         raise ParameterError(
             f"'{unused[0]}' is a function without limits. Give require={{'{unused[0]}': (low, high)}}."
