@@ -212,7 +212,7 @@ def test_a_tighter_tolerance_is_a_row_of_its_own_and_courses_are_laid_over_each_
     net.add(sw.Shaft("line", length=1.0, diameter=0.02), "a", "b")
     net.add(sw.Inertia("Jb", J=0.11), "b")
     study = work_precision(
-        net, "line", t_end=0.02, models=["Spectral(12)"], engines=["scipy"], rtols=[1e-3, 1e-6], points=21
+        net, "line", t_end=0.02, models=["Spectral(12)"], engines=["scipy-radau"], rtols=[1e-3, 1e-6], points=21
     )
     loose, tight = study.trials
     assert (loose.rtol, tight.rtol) == (1e-3, 1e-6)
