@@ -25,10 +25,8 @@ from shaftwork.hybrid.event_iteration import EventIteration
 from shaftwork.hybrid.hybrid_run import HybridRun
 from shaftwork.hybrid.hybrid_solution import solution
 from shaftwork.hybrid.hybrid_state import HybridState, passes_limit
-from shaftwork.hybrid.modes.mode_machines import ModeNames
 from shaftwork.hybrid.named_phases import known_modes, modes_in, whole_name, words_of
 from shaftwork.network.netlist import listed
-from shaftwork.numerics.tolerances import EQUAL
 from shaftwork.pipeline.arguments import Demand, Given, Point, Time
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.prepared import OperatingPoint, in_its_size
@@ -165,8 +163,7 @@ class HybridModel(Model):
         when = t if math.isfinite(t) else first.model.settled(p)
         event_iteration = EventIteration(self.equation_sets, values, (0.0, 1.0))
         state = event_iteration.started(when, initial_state(first.bound(p), initial or {}, when))
-        passed = list[tuple[ModeNames, Array]]()
-        while len(passed) < MOST_CHANGES and not _goes_round(passed):
+        for _ in range(MOST_CHANGES):
             bound = state.regime.bound
             if not math.isfinite(t):
                 refuse_moving(bound, when, state.regime.model.switching)
@@ -179,10 +176,8 @@ class HybridModel(Model):
                     warn_of_earlier_levels(bound, state.x, when, state.regime.model.switching)
                 warn_of_held_torques(state, when)
                 return SteadyState(state.stored(when), when)
-            stored = state.stored(when)
-            passed.append((state.regime.modes, np.array([stored[name] for name in self.states])))
         raise SimulationError(
-            f"No steady operation was found: after {len(passed)} changes of its modes '{self.name}' still goes on, "
+            f"No steady operation was found: after {MOST_CHANGES} changes of its modes '{self.name}' still goes on, "
             f"with {self.words(state)}. {another_start(self.form)}"
         )
 
@@ -220,16 +215,6 @@ class HybridModel(Model):
         return first.bound(p)
 
 
-def _goes_round(passed: list[tuple[ModeNames, Array]]) -> bool:
-    """Whether the last modes and states were there before, beside how far the way led from them: they come for ever."""
-    if not passed:
-        return False
-    modes, states = zip(*passed, strict=True)
-    scales = np.abs(states).max(axis=0)
-    away = (np.abs(np.array(states) - states[-1]) / np.where(scales, scales, 1.0)).max(axis=1)
-    return any(modes[k] == modes[-1] and away[k] < EQUAL * away[k:].max() for k in range(len(passed) - 1))
-
-
 def _ends(state: HybridState, t: float, x: Array) -> bool:
     return passes_limit(state._replace(x=x), t)
 
@@ -237,20 +222,18 @@ def _ends(state: HybridState, t: float, x: Array) -> bool:
 def warn_of_held_torques(state: HybridState, when: float, left: float = 1e-3) -> None:
     """Warn where what sticks can hold other torques as well: a spring between two of them, or from one to the frame.
 
-    What can hold within a range has limits on both sides: brakes, frictions and gears that are stuck. The states are
-    disturbed, and of that is read what is left for ever: it tells equilibria side by side.
+    The states are disturbed, and of that is read what is left for ever: it tells equilibria side by side.
 
     Args:
         state: the steady state.
         when: time at which laws are read, s.
-        left: part of what disturbs a torque that is left in it where it stays; rounding leaves some 1e-4 of it. It is
-            told of each torque by itself: beside that of a stiff floor, which is disturbed most, all others are small.
+        left: part of a disturbance that is left in a torque where it stays; rounding leaves some 1e-4 of it.
     """
     regime, x = state.regime, state.x
     holding = [
         (regime.machines[active.machine].name, active.guard)
         for active in regime.watched
-        if active.leave.by_torque and sum(leave.by_torque for leave in regime.mode(active.machine).leaves) > 1
+        if active.leave.by_torque and len(regime.mode(active.machine).gives_way) > 1
     ]
     if not (holding and x.size):
         return
@@ -261,7 +244,7 @@ def warn_of_held_torques(state: HybridState, when: float, left: float = 1e-3) ->
     now, soon, late = (
         np.array(regime.guards_at(when, (x + change).tolist())) for change in (0 * x, disturbed, remaining)
     )
-    moves = np.abs(late - now) > left * np.abs(soon - now)
+    moves = np.abs(late - now) > left * np.abs(soon - now).max()
     if names := tuple(dict.fromkeys(name for name, guard in holding if moves[guard])):
         network = bound.program.form.graph.name
         warn(
