@@ -11,20 +11,45 @@ from scipy.integrate import DOP853, Radau
 
 from shaftwork.core.errors import SimulationError
 from shaftwork.integrate.crossings import Dense
-from shaftwork.integrate.explicit.explicit_runs import MarchedRun, solid
+from shaftwork.integrate.engines import ENGINES
+from shaftwork.integrate.explicit.explicit_runs import INSIDE, MarchedRun, least_rates, stable
 from shaftwork.integrate.problem import Array, Problem, Trajectory
 from shaftwork.integrate.smooth_intervals import GuardedFunctions, PiecewiseDense, SmoothInterval, failure
 from shaftwork.integrate.stepping import Step, march, with_outputs
 
+FINEST = ENGINES["scipy"].finest
+
 Method = Literal["DOP853", "Radau"]
 
-METHODS: dict[str, Any] = {"DOP853": DOP853, "Radau": Radau}
+
+class _RateJudged(DOP853):  # type: ignore[misc]
+    """Dormand and Prince's method, a step of which is judged by the rates inside it as well.
+
+    Users read rates, as the torque on an inertia and the speed of a twist: small differences of large states. What the
+    error changes in them counts against the largest so far, unless the states are as right as rounding lets them be.
+    """
+
+    def __init__(self, *arguments: Any, sizes: Array, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self._sizes = sizes
+        """(n,) of the rates, the largest so far, kept up."""
+
+    def _estimate_error_norm(self, K: Array, h: float, scale: Array) -> float:
+        states = float(super()._estimate_error_norm(K, h, scale))
+        if not 0 < states < 1:
+            return states
+        moved = self.y + h * (self.A[INSIDE] @ K[: self.n_stages]) + self._estimate_error(K, h)
+        change = self.fun(self.t + h * self.C[INSIDE], moved) - K[INSIDE]
+        np.maximum(self._sizes, np.abs(K[[0, INSIDE]]).max(axis=0), out=self._sizes)
+        rates = float(np.sqrt(np.mean((change / (self.rtol * self._sizes)) ** 2)))
+        return min(rates, states * self.rtol / FINEST) if rates > states else states
+
+
+METHODS: dict[str, Any] = {"DOP853": _RateJudged, "Radau": Radau}
 
 
 def solve(problem: Problem, method: Method = "DOP853") -> Trajectory:
     """Integrate with one of scipy's methods.
-
-    An explicit run in which dampers carry small differences of large parts is made again, see `solid`.
 
     Args:
         problem: what to solve.
@@ -36,7 +61,7 @@ def solve(problem: Problem, method: Method = "DOP853") -> Trajectory:
     Source: scipy.integrate; Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I (DOP853) and II (Radau).
     """
     if method == "DOP853":
-        whole = solid(problem, lambda problem, longest: _run(problem, method, longest))
+        whole = stable(problem, lambda problem, longest: _run(problem, method, longest))
     else:
         whole = _run(problem, method)
     return with_outputs(problem, whole.march, whole.dense, whole.counts)
@@ -65,7 +90,7 @@ class _ScipyStepper:
     def __init__(self, problem: Problem, method: Method, longest: float) -> None:
         self._problem, self._method, self._longest = problem, method, longest
         self._solver: Any = None
-        self._calls = (0, 0)
+        self._calls, self._sizes = (0, 0), least_rates(problem)
         self.parts: list[Dense] = []
         """Dense output of the steps that were taken."""
 
@@ -106,7 +131,9 @@ class _ScipyStepper:
             self._calls = self.calls
         problem, functions = self._problem, self._functions
         options: dict[str, Any] = {"rtol": problem.rtol, "atol": problem.atol, "max_step": longest}
-        if self._method != "DOP853" and problem.jacobian is not None:
+        if self._method == "DOP853":
+            options["sizes"] = self._sizes
+        elif problem.jacobian is not None:
             options["jac"] = functions.jacobian
         with self._told(t, x):
             self._solver = METHODS[self._method](functions.rhs, t, x, end, **options)

@@ -15,7 +15,7 @@ import numpy as np
 from shaftwork.core.errors import ParameterError, SimulationError
 from shaftwork.integrate.crossings import RESTING, uneven
 from shaftwork.integrate.explicit.dormand_prince_loops import COURSE, advance, between, values_at
-from shaftwork.integrate.explicit.explicit_runs import MarchedRun, stable
+from shaftwork.integrate.explicit.explicit_runs import MarchedRun, least_rates, stable
 from shaftwork.integrate.problem import Array, MachineRates, Problem, Trajectory, changed
 from shaftwork.integrate.smooth_intervals import GuardedFunctions, SmoothInterval, failure, pieces
 from shaftwork.integrate.stepping import Step, march, with_outputs
@@ -150,7 +150,7 @@ class MachineSteps:
             bound = bound_of_decay(jacobians(problem))
             offsets = None if guards is None else guards.offsets
             longest = 1 / bound if bound > 0 else np.inf
-            piece, sizes = pieces(problem)[0], _least_rates(problem)
+            piece, sizes = pieces(problem)[0], least_rates(problem)
             at = MachineSnapshot(problem.t0, problem.x0, piece, 0.0, longest, offsets, problem.atol, sizes)
         elif guards is not None:
             problem = changed(problem, atol=at.atol, guards=replace(guards, offsets=np.asarray(at.offsets)))
@@ -179,11 +179,6 @@ class MachineSteps:
         return True
 
 
-def _least_rates(problem: Problem) -> Array:
-    """(n,) the size of rates from which on they matter: it changes a state by its nominal size in the whole time."""
-    return np.asarray(problem.atol / problem.rtol / (problem.t_end - problem.t0))
-
-
 def _system(machine: MachineRates, low: float, high: float) -> tuple[int, int, int, float, float, Array]:
     """A system as `dormand_prince_loops` takes it, with the earliest and latest time in s at which it is evaluated."""
     return machine.rates.address, machine.watched.address, machine.guards, low, high, machine.p
@@ -206,7 +201,7 @@ class _MachineStepper:
         self._taken, self.tried, self._steps = list[_Taken](), 0, 0
         self._clearance = CLEARANCE * float(np.spacing(max(abs(problem.t0), abs(problem.t_end))))
         self._uneven, guards, count = uneven(problem.x0.size), problem.guards, machine.guards
-        self.sizes = _least_rates(problem)
+        self.sizes = least_rates(problem)
         self._course = np.zeros((COURSE, count + machine.switches))
         sides, offsets, _ = self._course[-3:]
         if guards is not None:

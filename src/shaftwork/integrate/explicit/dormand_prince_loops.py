@@ -15,6 +15,7 @@ from scipy.integrate import DOP853
 
 from shaftwork.integrate.crossings import LEFT, RESTING
 from shaftwork.integrate.engines import ENGINES
+from shaftwork.integrate.explicit.explicit_runs import INSIDE
 from shaftwork.numerics.machine_code import MATRIX, VECTOR, call_at, compiled, inner
 from shaftwork.numerics.tolerances import EPS
 from shaftwork.numerics.zeros import LOOKS
@@ -22,7 +23,7 @@ from shaftwork.numerics.zeros import LOOKS
 STAGES, FURTHER, SHAPES = 12, 3, 7
 """Stages of a step, those that dense output needs besides the slope at the end, and the shapes that make it."""
 WEIGHTS = np.vstack([DOP853.B, DOP853.E5[:STAGES], DOP853.E3[:STAGES]])
-INSIDE, FINEST = 8, ENGINES["numba"].finest  # a stage amid a step; the finest tolerance
+FINEST = ENGINES["numba"].finest
 BEFORE, AFTER = np.ascontiguousarray(DOP853.A), np.ascontiguousarray(DOP853.A_EXTRA)
 NODES, LATER, DENSE = DOP853.C.copy(), DOP853.C_EXTRA.copy(), np.ascontiguousarray(DOP853.D)
 PARTS = np.array([0.0, *LOOKS, 1.0])

@@ -26,30 +26,19 @@ SPOILED = 1e-4
 REMEDY = "Make such a coupling rigid: leave the damper out and wire its ends to one node."
 
 
-def cancellation(problem: Problem, times: Array, states: Array) -> float:
-    """How much larger than the torques of a run are the parts of which dampers make them up; at least 1.
-
-    Torques count that dampers give, that springs give at the speeds of the run, and that reach them within it.
+def spoiled(problem: Problem, times: Array, states: Array) -> str | None:
+    """What to say where rounding spoils the torques of dampers in a network that is not linear, or None.
 
     Args:
         problem: what was solved.
         times: (k,) some times of the run, s.
         states: (k, n) then.
     """
-    return _largest(problem, times, states, springs=True)
-
-
-def spoiled(problem: Problem, times: Array, states: Array) -> str | None:
-    """What to say where rounding spoils the torques of dampers in a network that is not linear, or None.
-
-    Args:
-        problem, times, states: as in `cancellation`.
-    """
     duration, eps = problem.t_end - problem.t0, float(np.finfo(float).eps)
     most = max(float(part.sizes.sum(axis=1).max(initial=0.0)) for part in _parts(problem, times[:1], states[:1]))
     if not most * duration * eps > SPOILED:
         return None
-    part = eps * _largest(problem, times, states, springs=False)
+    part = eps * _largest(problem, times, states)
     if part < SPOILED:
         return None
     return (
@@ -67,17 +56,15 @@ class _Part:
     Args:
         damping: (n, n).
         sizes: (n, n) of its entries.
-        oscillation: (n,) row sums of the springs, rad/s.
         scale: (n,) of the states.
     """
 
     damping: Any
     sizes: Any
-    oscillation: Array
     scale: Array
 
 
-def _largest(problem: Problem, times: Array, states: Array, *, springs: bool) -> float:
+def _largest(problem: Problem, times: Array, states: Array) -> float:
     """The largest ratio of the parts of a damper's torque to this torque, or to what else acts there."""
     chosen = np.unique(np.linspace(0, times.size - 1, 12).astype(int))  # so many tell what dampers take
     sums, torques, other = (np.full(problem.x0.size, np.finfo(float).tiny) for _ in range(3))
@@ -87,7 +74,7 @@ def _largest(problem: Problem, times: Array, states: Array, *, springs: bool) ->
         x = state / part.scale
         sums = np.maximum(sums, part.sizes @ np.abs(x))
         torques = np.maximum(torques, np.abs(part.damping @ x))
-        other = np.maximum(other, (np.maximum(slowest, part.oscillation) if springs else slowest) * np.abs(x))
+        other = np.maximum(other, slowest * np.abs(x))
     return float(np.max(sums / np.maximum(torques, other), initial=1.0))
 
 
@@ -95,10 +82,10 @@ def _parts(problem: Problem, times: Array, states: Array) -> list[_Part]:
     """Of the Jacobian at each time, all in one scale; of a linear system once for all runs."""
     linear = problem.linear
     if linear is not None:
-        return [linear.cached("cancellation", lambda: _split([linear.A])[0])] * times.size
+        return [linear.cached("damping", lambda: _split([linear.A])[0])] * times.size
     if problem.jacobian is None:
         nothing = np.zeros((problem.x0.size, problem.x0.size))
-        return [_Part(nothing, nothing, nothing.sum(axis=0), nothing.sum(axis=0) + 1)] * times.size
+        return [_Part(nothing, nothing, np.ones(problem.x0.size))] * times.size
     return _split(jacobians_at(problem, times, states))
 
 
@@ -116,7 +103,7 @@ def _split(matrices: list[Any]) -> list[_Part]:
         else:
             springs = scaled * (scaled.multiply(scaled.T) < 0)
         damping = scaled - springs
-        parts.append(_Part(damping, abs(damping), np.asarray(abs(springs).sum(axis=1)), scale))
+        parts.append(_Part(damping, abs(damping), scale))
     return parts
 
 
