@@ -167,6 +167,46 @@ def test_torques_between_what_sticks_are_said_to_be_one_of_many() -> None:
     assert again[-1] == pytest.approx(steady["shaft.tau_c"], rel=1e-9)  # it does last
 
 
+def test_a_stiff_floor_beside_a_held_torque_does_not_hide_that_it_is_one_of_many() -> None:
+    """The floor is disturbed by forces some 1e4 times as large; the brake can hold what the rope has."""
+    net = sw.Network("ladle on the floor")
+    net.add(sw.Inertia("J1", J=1.0), "a")
+    net.add(sw.Brake("brake", tau=2e4), "a")
+    net.add(sw.Drum("drum", radius=0.5), "a", "rim")
+    net.add(sw.TranslationalSpring("rope", c=1e5, d=1e3), "rim", "hook")
+    net.add(sw.Mass("ladle", m=5e3), "hook")
+    net.add(sw.ForceSource("weight", f=-5e4), "hook")
+    net.add(sw.Rope("floor", c=5e9, d=1e6), "ground", "hook")
+    model = net.compile()
+    with pytest.warns(sw.NetworkWarning, match=r"'brake' can hold within a range"):
+        steady = model.steady_state(t=0.0)
+    with pytest.warns(sw.NetworkWarning, match=r"'brake' can hold within a range"):
+        other = model.steady_state(t=0.0, initial={"rope.f_c": 1e4})
+    assert abs(other["rope.f_c"] - steady["rope.f_c"]) > 5e3  # N, of which the rope kept nearly all
+
+
+def test_a_spring_between_two_self_locking_gears_holds_one_torque_of_many() -> None:
+    """Neither gear turns from the side of the spring, whatever it has."""
+    net = sw.Network("clamped")
+    for end, node in (("left", "a"), ("right", "b")):
+        net.add(sw.Inertia(f"J {end}", J=1.0), f"hand {node}")
+        net.add(sw.LossyGear(end, ratio=10.0, efficiency=0.6, efficiency_back=-0.2), f"hand {node}", node)
+    net.add(sw.Spring("shaft", c=1e4, d=10.0), "a", "b")
+    with pytest.warns(sw.NetworkWarning, match=r"'left', 'right' can hold within a range"):
+        steady = net.compile().steady_state(initial={"shaft.tau_c": 50.0})
+    assert steady["shaft.tau_c"] == pytest.approx(50.0, rel=1e-6)
+
+
+def test_a_self_locking_gear_that_alone_holds_a_weight_has_one_torque() -> None:
+    net = sw.Network("jack")
+    net.add(sw.Inertia("J1", J=1.0), "hand")
+    net.add(sw.LossyGear("worm", ratio=10.0, efficiency=0.6, efficiency_back=-0.2), "hand", "a")
+    net.add(sw.Spring("shaft", c=1e4, d=10.0), "a", "b")
+    net.add(sw.Inertia("J2", J=5.0), "b")
+    net.add(sw.TorqueSource("weight", tau=-50.0), "b")
+    assert net.compile().steady_state()["shaft.tau_c"] == pytest.approx(50.0, rel=1e-6)  # a warning is an error here
+
+
 def test_torques_that_only_one_equilibrium_has_warn_of_nothing() -> None:
     """A source turns against what sticks, or what slips: warnings are errors here."""
     load = sw.CoulombLoad("load", tau=3.0), "b"

@@ -222,18 +222,20 @@ def _ends(state: HybridState, t: float, x: Array) -> bool:
 def warn_of_held_torques(state: HybridState, when: float, left: float = 1e-3) -> None:
     """Warn where what sticks can hold other torques as well: a spring between two of them, or from one to the frame.
 
-    The states are disturbed, and of that is read what is left for ever: it tells equilibria side by side.
+    What can hold within a range has limits on both sides: brakes, frictions and gears that are stuck. The states are
+    disturbed, and of that is read what is left for ever: it tells equilibria side by side.
 
     Args:
         state: the steady state.
         when: time at which laws are read, s.
-        left: part of a disturbance that is left in a torque where it stays; rounding leaves some 1e-4 of it.
+        left: part of what disturbs a torque that is left in it where it stays; rounding leaves some 1e-4 of it. It is
+            told of each torque by itself: beside that of a stiff floor, which is disturbed most, all others are small.
     """
     regime, x = state.regime, state.x
     holding = [
         (regime.machines[active.machine].name, active.guard)
         for active in regime.watched
-        if active.leave.by_torque and len(regime.mode(active.machine).gives_way) > 1
+        if active.leave.by_torque and sum(leave.by_torque for leave in regime.mode(active.machine).leaves) > 1
     ]
     if not (holding and x.size):
         return
@@ -244,7 +246,7 @@ def warn_of_held_torques(state: HybridState, when: float, left: float = 1e-3) ->
     now, soon, late = (
         np.array(regime.guards_at(when, (x + change).tolist())) for change in (0 * x, disturbed, remaining)
     )
-    moves = np.abs(late - now) > left * np.abs(soon - now).max()
+    moves = np.abs(late - now) > left * np.abs(soon - now)
     if names := tuple(dict.fromkeys(name for name, guard in holding if moves[guard])):
         network = bound.program.form.graph.name
         warn(
