@@ -90,9 +90,11 @@ def test_the_right_hand_side_is_never_evaluated_at_or_past_the_end_of_a_piece(os
     assert 1.0 not in asked
     assert asked.max() < 3.0
     assert asked.min() > 0.0
-    first_late = int(np.argmax(asked > 1.0))
-    assert (asked[:first_late] < 1.0).all()
-    assert (asked[first_late:] > 1.0).all()
+    # At the very starts of the pieces an explicit engine looks, after its run, for how fast they decay.
+    in_order = asked[(asked > 1e-12) & (np.abs(asked - 1.0) > 1e-12)]
+    first_late = int(np.argmax(in_order > 1.0))
+    assert (in_order[:first_late] < 1.0).all()
+    assert (in_order[first_late:] > 1.0).all()
 
 
 @pytest.mark.slow
