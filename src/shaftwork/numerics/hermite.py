@@ -11,6 +11,8 @@ from shaftwork.numerics.machine_code import inner
 
 JET = 3
 """What is known of a quantity at a time: its value and its first two derivatives by time."""
+EDGE = 1e-4
+"""A peak is told no nearer to the ends of an interval than by this share of it: both parts of it are to be shorter."""
 BEYOND = 0.2
 """Of the difference between the cubic and the quintic in the middle of an interval: so far the motion may be from the
 quintic. Of a sine, whose samples are less than half a period apart, it is at most half of that."""
@@ -76,4 +78,4 @@ def peak(length, left, right):  # type: ignore[no-untyped-def]
             if height > top:
                 top, place = height, u
         low, low_slope = high, high_slope
-    return min(max(place, 1e-4), 1 - 1e-4), top
+    return min(max(place, EDGE), 1 - EDGE), top

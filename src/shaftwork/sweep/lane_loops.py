@@ -15,7 +15,7 @@ from shaftwork.numerics.hermite import JET, peak, powers, reach, root
 from shaftwork.numerics.lane_functions import LANES
 from shaftwork.numerics.machine_code import compiled, inner, run_at
 from shaftwork.numerics.tolerances import EPS, ROUNDINGS, TYPED
-from shaftwork.sweep.lane_tables import LaneNumber, LaneRow, Met
+from shaftwork.sweep.lane_tables import FIRST_CHANGE, LOOKS, MOST_STEPS, PAST, TOLD, LaneNumber, LaneRow, Met
 
 
 @inner
@@ -99,10 +99,10 @@ def _top(tables, probe, stack, row, sign, offset, best, near, enough):  # type: 
         t = low + place * (high - low)
         # what a polynomial misses grows with the cube of the distance from a point that it goes through
         part = min(t - low, high - t) / room if room > 0 else 1.0
-        if part < 0.01 and missed * part * part * part < near:
+        if part < TOLD and missed * part * part * part < near:
             best = max(best, height) if enough == np.inf else best
             continue
-        if looks > 60 or count + 2 > len(stack):
+        if looks > LOOKS or count + 2 > len(stack):
             return np.nan, when
         looks += 1
         _probe(tables, probe, t)
@@ -152,13 +152,13 @@ def _first_met(tables, now, probe, stack, lane):  # type: ignore[no-untyped-def]
 
 @inner
 def _past(tables, probe, end):  # type: ignore[no-untyped-def]
-    """A time in s just past that of a probe, up to which no state moves by more than a hundredth of its tolerance."""
+    """A time in s just past that of a probe, up to which no state moves by more than a small part of its tolerance."""
     longest, tolerance = np.inf, probe[LaneRow.TOLERANCE.value, 0]
     for row in range(tables[LaneNumber.STATES.value]):
         x = probe[tables[LaneRow.NEW.value] + row, 0]
         rate = (x - probe[tables[LaneRow.X.value] + row, 0]) / probe[LaneRow.SIZE.value, 0]
         if rate != 0.0:
-            allowed = 0.01 * tolerance * (probe[tables[LaneRow.NOMINAL.value] + row, 0] + abs(x))
+            allowed = PAST * tolerance * (probe[tables[LaneRow.NOMINAL.value] + row, 0] + abs(x))
             longest = min(longest, allowed / abs(rate))
     return min(end, probe[LaneRow.MOMENT.value, 0] + longest)
 
@@ -198,7 +198,7 @@ def _leave(tables, course, now, memory, x, lane, t, met):  # type: ignore[no-unt
 
 @inner
 def _begin(tables, now, lane):  # type: ignore[no-untyped-def]
-    """Set the first step: as the last one, or such that no state changes by more than a hundredth of its size.
+    """Set the first step: as the last one, or such that no state changes by more than a small part of its size.
 
     A law's switch is met on the side on which its value is not, or to which it does not go.
     """
@@ -206,7 +206,7 @@ def _begin(tables, now, lane):  # type: ignore[no-untyped-def]
     for row in range(tables[LaneNumber.STATES.value]):
         x, rate = now[tables[LaneRow.X.value] + row, lane], now[tables[LaneRow.SLOPES.value] + row, lane]
         if rate != 0.0:
-            step = min(step, 0.01 * (now[tables[LaneRow.NOMINAL.value] + row, lane] + abs(x)) / abs(rate))
+            step = min(step, FIRST_CHANGE * (now[tables[LaneRow.NOMINAL.value] + row, lane] + abs(x)) / abs(rate))
     now[LaneRow.STEP.value, lane] = max(step, now[LaneRow.STEP.value, lane])
     guards = tables[LaneNumber.GUARDS.value]
     for guard in range(guards - tables[LaneNumber.SWITCHES.value], guards):
@@ -244,13 +244,10 @@ def _arrived(tables, course, now, probe, there, stack, lane):  # type: ignore[no
 
 @inner
 def _hopeless(now, lane, end):  # type: ignore[no-untyped-def]
-    """Whether the steps of a lane have become too short, or so many are foreseen that it is better off alone.
-
-    A variant that will take more than 100 000 up to the end is stiff, or swings that often.
-    """
+    """Whether the steps of a lane have become too short, or too many are foreseen up to the end."""
     t, count = now[LaneRow.TIME.value, lane], now[LaneRow.MADE.value, lane]
     gone = t - now[LaneRow.BEGUN.value, lane]
-    slow = count > 4 * LANES and count * (gone + end - t) > 100_000 * gone
+    slow = count > 4 * LANES and count * (gone + end - t) > MOST_STEPS * gone
     return slow or (count > 0 and not now[LaneRow.STEP.value, lane] > 8 * EPS * abs(t))
 
 

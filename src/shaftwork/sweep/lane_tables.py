@@ -7,6 +7,17 @@ from typing import NamedTuple
 
 from shaftwork.codegen.array_form.elements import Array, Index
 
+FIRST_CHANGE = 0.01
+"""By so small a part of its size each state may change in a first step."""
+PAST = 0.01
+"""A switch of a law is passed by so small a part of the tolerance of each state."""
+TOLD = 0.01
+"""A quintic is believed where its own points are nearer by this factor than they were to the place looked at before."""
+LOOKS = 60
+"""A peak or a guard that so many looks into a step have not told is left to a single run."""
+MOST_STEPS = 100_000
+"""A variant that will take more of them is stiff, or swings that often: it is better off alone."""
+
 
 class Met(IntEnum):
     """What a lane has met where that is no guard: nothing, the end, or what it cannot pass."""

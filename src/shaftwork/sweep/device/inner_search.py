@@ -10,13 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from shaftwork.numerics.hermite import JET, powers
+from shaftwork.numerics.hermite import EDGE, JET, powers
 from shaftwork.numerics.tolerances import TYPED
+from shaftwork.sweep.lane_tables import LOOKS, TOLD
 
 DEPTH = 16
 """Intervals that may wait beside the first ones."""
-LOOKS = 60
-"""A peak that is not told by so many is left."""
 INTERVAL = 11
 """Time and jet at both ends, how much the quintic was off at one of them, how near that was, and the watched number."""
 quintic: Any = powers.py_func
@@ -170,7 +169,7 @@ class InnerSearch:
         """Whether the quintic tells enough: what it misses grows with the cube of the distance from its points."""
         (low, high), (missed, room), numpy = (interval[0], interval[4]), interval[8:10], self._numpy
         part = numpy.where(room > 0, numpy.minimum(t - low, high - t) / numpy.where(room > 0, room, 1.0), 1.0)
-        return (part < 0.01) & (missed * part**3 < near)
+        return (part < TOLD) & (missed * part**3 < near)
 
     def _raise(self, memory: dict[str, Any], on: Any, number: Any, value: Any) -> None:
         """Let the largest value of an extreme of some lanes be no less than another."""
@@ -188,7 +187,7 @@ class InnerSearch:
         heights = numpy.polyval(numpy.stack(curve)[:, None], place)
         heights = numpy.where((rates[:-1] > 0) & (rates[1:] < 0), heights, -np.inf)
         top = numpy.argmax(heights, axis=0)
-        return numpy.clip(self._at(place, top), 1e-4, 1 - 1e-4), self._at(heights, top)
+        return numpy.clip(self._at(place, top), EDGE, 1 - EDGE), self._at(heights, top)
 
     def root(self, curve: Any, low: Any, high: Any, rising: float, most: int) -> Any:
         """A zero of polynomials between two places; see `hermite.root`."""

@@ -19,7 +19,7 @@ from shaftwork.numerics.tolerances import EPS, ROUNDINGS
 from shaftwork.numerics.traced_code import TracedBody, rows_of
 from shaftwork.sweep.device.inner_search import InnerSearch, quintic
 from shaftwork.sweep.lane_step import STAGES, StepWriter
-from shaftwork.sweep.lane_tables import Met
+from shaftwork.sweep.lane_tables import FIRST_CHANGE, MOST_STEPS, PAST, Met
 
 SCRATCH = ("y", "new", "slopes", "fifth", "third", "fifths", "thirds", "moment")
 """What holds within a repetition alone."""
@@ -150,7 +150,9 @@ class LockStep:
         """Set the first step of some lanes; see `lane_loops`."""
         numpy, states = self._numpy, self._sizes["nominal"]
         rates, x = abs(memory["slopes"][:states]), abs(memory["x"][:states])
-        sizes = numpy.where(rates > 0, 0.01 * (memory["nominal"] + x) / numpy.where(rates > 0, rates, 1.0), np.inf)
+        sizes = numpy.where(
+            rates > 0, FIRST_CHANGE * (memory["nominal"] + x) / numpy.where(rates > 0, rates, 1.0), np.inf
+        )
         first = numpy.maximum(numpy.min(sizes, axis=0), memory["step"])
         memory["step"] = numpy.where(starting, first, memory["step"])
         memory["mode"] = numpy.where(starting, LaneTask.GOES, memory["mode"])
@@ -198,7 +200,7 @@ class LockStep:
         """Whether the steps of lanes have become too short, or too many are foreseen; see `lane_loops`."""
         time, step, count = memory["time"][0], memory["step"][0], memory["made"][0]
         gone = time - memory["begun"][0]
-        slow = (count > 4 * LANES) & (count * (gone + memory["far"] - time) > 100_000 * gone)
+        slow = (count > 4 * LANES) & (count * (gone + memory["far"] - time) > MOST_STEPS * gone)
         return (memory["mode"] == LaneTask.GOES) & (slow | (count > 0) & ~(step > 8 * EPS * abs(time)))
 
     def _exceeded(self, memory: dict[str, Any]) -> Any:
@@ -250,7 +252,7 @@ class LockStep:
         states = slice(0, self._sizes["nominal"])
         change = abs(memory["new"][states] - memory["last_x"][states])
         rate = change / (memory["goal"] - memory["last_time"][0])
-        part = numpy.maximum(0.01 * memory["tolerance"], ROUNDINGS * rounding)
+        part = numpy.maximum(PAST * memory["tolerance"], ROUNDINGS * rounding)
         near = part * (memory["nominal"] + abs(memory["new"][states]))
         longest = numpy.min(numpy.where(rate > 0, near / numpy.where(rate > 0, rate, 1.0), np.inf), axis=0)
         past = numpy.minimum(memory["end"][0], memory["goal"] + longest)
