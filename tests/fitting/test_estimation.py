@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy import stats
 
-from shaftwork.fitting.estimation import LOSSES, Data, estimate
+from shaftwork.fitting.estimation import estimate
+from shaftwork.fitting.spreads import LOSSES, Data
 
 Array = NDArray[np.float64]
 ANYWHERE = (np.full(2, -np.inf), np.full(2, np.inf))
@@ -106,6 +108,61 @@ def test_intervals_of_every_loss_are_as_wide_as_estimates_spread(loss: str) -> N
         stated.append(found.covariance[1, 1] ** 0.5)
     # the deviation of 200 values is known to 5 percent
     assert np.mean(stated) == pytest.approx(np.std(slopes), rel=0.12)
+
+
+def shares_inside(x: Array, loss: str, records: int, deviations: Array | None = None) -> float:
+    """The share of records of a line whose 95 percent interval of the slope holds the true one."""
+    inside = 0
+    for seed in range(records):
+        y = 1.0 + 2.0 * x + np.random.default_rng(seed).normal(0.0, 0.1, x.size)
+        found = estimate(Line(x), data(y, deviations, loss), np.zeros(2), ANYWHERE)
+        inside += abs(found.unknowns[1] - 2.0) <= found.reach(0.95)[1]
+    return inside / records
+
+
+@pytest.mark.parametrize(
+    ("count", "loss", "sigma"), [(3, "linear", False), (6, "linear", False), (6, "linear", True), (50, "huber", False)]
+)
+def test_intervals_hold_the_true_value_in_95_of_100_records(count: int, loss: str, sigma: bool) -> None:  # noqa: FBT001
+    share = shares_inside(np.linspace(0.0, 1.0, count), loss, 600, np.array([0.1]) if sigma else None)
+    assert 0.92 < share < 0.98  # 600 records tell it to 0.009; normal quantiles of six values are right in 0.88
+
+
+class TwoLines:
+    """Two levels, each of a series of its own."""
+
+    def __init__(self, counts: tuple[int, int]) -> None:
+        self._columns = np.repeat(np.eye(2), counts, axis=0)
+
+    def values(self, unknowns: Array) -> Array:
+        return np.asarray(self._columns @ unknowns)
+
+    def slopes(self, _: Array) -> Array:
+        return self._columns
+
+
+def test_what_a_short_series_tells_alone_has_the_degrees_of_freedom_of_that() -> None:
+    none, y = np.full(2, np.nan), np.random.default_rng(0).normal(0.0, 0.1, 54)
+    measured = Data(y, np.repeat([0, 1], [50, 4]), None, none, none, "linear")
+    found = estimate(TwoLines((50, 4)), measured, np.zeros(2), ANYWHERE)
+    assert found.freedom == pytest.approx([49.0, 3.0], rel=1e-9)
+    expected = [stats.t.ppf(0.975, part.size - 1) * part.std(ddof=1) / part.size**0.5 for part in (y[:50], y[50:])]
+    assert found.reach(0.95) == pytest.approx(expected, rel=1e-3)  # deviations settle to 1e-4
+
+
+def test_as_many_values_as_unknowns_tell_no_noise() -> None:
+    x = np.array([0.0, 1.0])
+    found = estimate(Line(x), data(1.0 + 2.0 * x), np.zeros(2), ANYWHERE)
+    assert found.unknowns == pytest.approx([1.0, 2.0], rel=1e-9)
+    assert np.isinf(found.reach(0.95)).all()
+
+
+def test_a_value_that_is_given_nearly_exactly_leaves_the_other_as_well_known_as_it_is() -> None:
+    x = np.linspace(0.0, 1.0, 20)
+    exact = Data(1.0 + 2.0 * x, np.zeros(20, dtype=np.intp), np.array([0.1]), np.array([1.0, np.nan]),
+                 np.array([1e-9, np.nan]), "linear")  # fmt: skip
+    found = estimate(Line(x), exact, np.zeros(2), ANYWHERE)
+    assert found.sizes[1] == pytest.approx(0.1 / np.linalg.norm(x), rel=1e-6)
 
 
 class Restless:

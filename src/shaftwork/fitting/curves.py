@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any, Protocol
 
 import numpy as np
@@ -34,33 +36,53 @@ class Scaling:
     """Parameters by their change since the start: logarithms of those that stay above zero, others by their size.
 
     At the start all are 0.3. As scipy's first step is as long as its start, it changes what counts most by no more.
+    Errors are spread evenly in these, but for what may be zero, a damping or a gap: of this in the values themselves.
 
     Args:
         start: values in SI by name.
         positive: (m,) which are taken by their logarithms.
         sizes: (m,) of the values.
+        to_zero: (m,) which of the positive ones may be zero as well.
     """
 
-    def __init__(self, start: Mapping[str, float], positive: NDArray[np.bool_], sizes: Array) -> None:
+    def __init__(
+        self, start: Mapping[str, float], positive: NDArray[np.bool_], sizes: Array, to_zero: NDArray[np.bool_]
+    ) -> None:
         self.start, self.names, self.positive, self._sizes = start, tuple(start), positive, sizes
-        self._first, self._offset = np.array(list(start.values())), 0.3
+        self.to_zero = to_zero & positive
+        self.first, self._offset = np.array(list(start.values())), 0.3
+        self.floor = np.where(self.to_zero, self._offset + math.log(0.01), -np.inf)
+        """(m,) below these unknowns a value is zero beside its start."""
 
     def unknowns(self, values: Array) -> Array:
         """(m,) from values in SI."""
         with np.errstate(divide="ignore"):  # a bound of zero is minus infinity
             grown = np.log(np.where(self.positive, values / self._sizes, 1.0))
-        return self._offset + np.where(self.positive, grown, (values - self._first) / self._sizes)
+        return self._offset + np.where(self.positive, grown, (values - self.first) / self._sizes)
 
     def values(self, unknowns: Array) -> Array:
         """(m,) in SI."""
         change = unknowns - self._offset
         with np.errstate(over="ignore"):  # of what is not known at all
-            grown = self._first * np.exp(np.where(self.positive, change, 0.0))
-        return np.where(self.positive, grown, self._first + change * self._sizes)
+            grown = self.first * np.exp(np.where(self.positive, change, 0.0))
+        return np.where(self.positive, grown, self.first + change * self._sizes)
 
     def slopes(self, unknowns: Array) -> Array:
         """(m,) derivatives of the values by the unknowns."""
         return np.where(self.positive, self.values(unknowns), self._sizes)
+
+    def stretch(self, unknowns: Array) -> Array:
+        """(m,) derivatives of the unknowns by coordinates in which errors are spread evenly.
+
+        Those of what may be zero are parts of its value, or of a hundredth of that at the start where it is less.
+        """
+        return np.fmax(1.0, np.exp(np.fmin(self.floor - unknowns, 600.0)))  # so small a value has no slope
+
+    def ends(self, unknowns: Array, reach: Array, bounds: tuple[Array, Array]) -> Array:
+        """(m,) values so far away in these coordinates, within the bounds (m,) and (m,) of the unknowns."""
+        with np.errstate(invalid="ignore"):  # no number stays none
+            straight = self.values(unknowns) + reach * self.slopes(unknowns) * self.stretch(unknowns)
+            return np.clip(np.where(self.to_zero, straight, self.values(unknowns + reach)), *map(self.values, bounds))
 
 
 class ScaledCurves:
@@ -107,16 +129,18 @@ class ScaledCurves:
         return self._slopes(unknowns.tobytes(), lambda: self._differentiated(unknowns))
 
     def _differentiated(self, unknowns: Array) -> Array:
-        parameters, exact = self._parameters(unknowns), list[Array]()
-        try:
-            exact += [by for source in self._sources if (by := source.slopes(parameters)) is not None]
-        except SimulationError:  # something is touched only just, or two changes come together
-            exact.clear()
-        if len(exact) == len(self._sources):
-            return np.vstack(exact) * self._scale.slopes(unknowns)
+        parameters = self._parameters(unknowns)
+        return np.vstack([self._along(source, parameters, unknowns) for source in self._sources])
+
+    def _along(self, source: Source, parameters: Mapping[str, float], unknowns: Array) -> Array:
+        exact = None
+        with suppress(SimulationError):  # something is touched only just, or two changes come together
+            exact = source.slopes(parameters)
+        if exact is not None:
+            return exact * self._scale.slopes(unknowns)
         self.by_differences = True
         steps = np.full(unknowns.size, 1e-4)  # a motion is known to 1e-9 and more: so its differences are to some 1e-5
-        return differences(self._read, unknowns, steps)
+        return differences(lambda point: source.values(self._parameters(point)), unknowns, steps)
 
 
 class RecordedMotion:
@@ -173,7 +197,7 @@ def sizes_of(start: Mapping[str, float], sources: Sequence[Source], measured: Ar
     sizes, ones = np.abs(list(start.values())), np.ones(len(start))
     if sizes.all():
         return sizes
-    scale = Scaling(start, ones < 0, ones)
+    scale = Scaling(start, ones < 0, ones, ones < 0)
     moved = np.linalg.norm(ScaledCurves(sources, scale).slopes(scale.unknowns(np.array(list(start.values())))), axis=0)
     size = float(np.linalg.norm(measured))
     return np.where(sizes > 0.0, sizes, np.divide(size, moved, out=ones, where=(moved > 0.0) & (size > 0.0)))

@@ -1,9 +1,6 @@
-"""Estimation of unknowns by weighted least squares: values, covariance, and what the data cannot tell.
+"""Estimation of unknowns by weighted least squares.
 
-Law: the unknowns minimise sum rho(r^2), r = (computed - measured) / deviation, with rho(z) = z or a robust loss. With
-the Jacobian J of r their covariance is (J^T J)^-1. Of a robust loss with psi = rho'(r^2) r it is
-B^-1 (J^T psi psi^T J) B^-1,
-with B = J^T J times the mean of the derivative of psi. Source: Huber and Ronchetti, Robust Statistics, 2009.
+Law: the unknowns minimise sum rho(r^2), r = (computed - measured) / deviation, with rho(z) = z or a robust loss.
 """
 
 from __future__ import annotations
@@ -14,23 +11,13 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 from scipy.optimize import least_squares
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import ParameterError, SimulationError
+from shaftwork.fitting.spreads import LOSSES, Data, degrees, robust_size, spreads
 from shaftwork.numerics.tolerances import EPS, EQUAL, TYPED
-
-LOSSES: dict[str, Callable[[Array], tuple[Array, Array, Array]]] = {
-    "linear": lambda z: (z, np.ones_like(z), np.zeros_like(z)),
-    "soft_l1": lambda z: (2 * (np.sqrt(1 + z) - 1), (1 + z) ** -0.5, -0.5 * (1 + z) ** -1.5),
-    "huber": lambda z: (
-        np.where(z <= 1, z, 2 * np.sqrt(z) - 1),
-        np.where(z <= 1, 1.0, np.maximum(z, 1.0) ** -0.5),
-        np.where(z <= 1, 0.0, -0.5 * np.maximum(z, 1.0) ** -1.5),
-    ),
-    "cauchy": lambda z: (np.log1p(z), 1 / (1 + z), -1 / (1 + z) ** 2),
-}
-"""By name, rho, rho' and rho'' of z = r^2."""
 
 
 class Curves(Protocol):
@@ -46,63 +33,59 @@ class Curves(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Data:
-    """What is measured.
-
-    Args:
-        measured: (N,) values.
-        series: (N,) the number of the series that each belongs to.
-        deviations: (series,) standard deviations of the noise; None to estimate them.
-        priors: (m,) values expected of the unknowns; NaN where nothing is.
-        prior_deviations: (m,) their standard deviations.
-        loss: a name of `LOSSES`.
-    """
-
-    measured: Array
-    series: NDArray[np.intp]
-    deviations: Array | None
-    priors: Array
-    prior_deviations: Array
-    loss: str
-
-    @property
-    def counts(self) -> Array:
-        """(series,) values of each."""
-        return np.bincount(self.series).astype(float)
-
-
-@dataclass(frozen=True, eq=False)
 class Estimate:
     """Unknowns that fit.
+
+    Covariance, directions, their spreads and the step are in coordinates in which errors are spread evenly on both
+    sides: see `spreads`.
 
     Args:
         unknowns: (m,) values.
         covariance: (m, m); infinite where the data tell nothing.
+        freedom: (m,) degrees of freedom of the t-distribution of each; see `Spreads`.
         deviations: (series,) standard deviations of the noise.
         residuals: (N,) computed less measured.
         directions: (m, m) combinations of the unknowns, each a row of length one, the best known first.
         spreads: (m,) standard deviation of each combination.
-        at_bounds: (m,) which unknowns ended at a bound.
+        step: (m,) from here to where the minimum were without bounds, as far as derivatives tell.
+        bounds: (m,) and (m,) of the unknowns.
+        at_bounds: (m,) which unknowns ended at one.
         evaluations: motions computed over the whole record.
         message: why it is no minimum yet; empty where it is one.
-        misfit: minus twice the logarithm of the likelihood, but for a constant; a difference counts like one of chi^2.
+        deviance: minus twice the logarithm of the likelihood, but for a constant; a difference counts like one of
+            chi^2.
     """
 
     unknowns: Array
     covariance: Array
+    freedom: Array
     deviations: Array
     residuals: Array
     directions: Array
     spreads: Array
+    step: Array
+    bounds: tuple[Array, Array]
     at_bounds: NDArray[np.bool_]
     evaluations: int
     message: str
-    misfit: float
+    deviance: float
+
+    def reach(self, level: float) -> Array:
+        """(m,) how far an interval of a level goes to either side; infinite where the data tell nothing."""
+        known = self.freedom > 0
+        quantiles = np.where(known, stats.t.ppf((1 + level) / 2, np.where(known, self.freedom, 1.0)), np.inf)
+        return np.asarray(quantiles * self.sizes)
+
+    @property
+    def sizes(self) -> Array:
+        """(m,) standard deviations."""
+        return np.where(self.freedom > 0, np.sqrt(np.diag(self.covariance)), np.inf)
 
     def alike(self, other: Estimate) -> bool:
-        """Whether another is in the same minimum: no unknown differs by more than its standard deviation here."""
-        reach = np.fmax(np.sqrt(np.diag(self.covariance)), EQUAL)
-        return bool((np.abs(self.unknowns - other.unknowns) <= reach).all())
+        """Whether another is in the same minimum: as deep, and no unknown differs by more than its deviation here."""
+        reach = np.fmax(self.sizes, EQUAL)
+        near = bool((np.abs(self.unknowns - other.unknowns) <= reach).all())
+        return near and abs(self.deviance - other.deviance) < 1
 
 
 def estimate(
@@ -112,6 +95,7 @@ def estimate(
     bounds: tuple[Array, Array],
     beginning: tuple[Curves, NDArray[np.bool_]] | None = None,
     effort: tuple[int, int] = (30, 200),
+    stretch: Callable[[Array], Array] = np.ones_like,
 ) -> Estimate:
     """Fit the unknowns, and the deviations of the noise in turn with them where these are not given.
 
@@ -122,27 +106,35 @@ def estimate(
         bounds: (m,) and (m,) of the unknowns.
         beginning: a part of the curves that is fitted first, and (N,) which values it holds.
         effort: at most so many rounds, and motions in each; deviations and unknowns settle in some five rounds.
+        stretch: (m,) derivatives of the unknowns by those coordinates in which errors are spread evenly, see `spreads`.
 
     Raises:
         ParameterError: there are fewer values than unknowns.
         SimulationError: the motion at the start cannot be computed.
     """
-    unknowns, weights = _begun(curves, data, start, bounds, beginning)
-    result, weights, evaluations, message = _settled(curves, data, unknowns, weights, bounds, effort)
-    unknowns, residuals = result.x, curves.values(result.x) - data.measured
-    at_bounds, slopes = result.active_mask != 0, curves.slopes(unknowns)
-    covariance, directions, spreads = _spread(slopes, residuals, data, weights, at_bounds)
-    if data.loss == "linear" and np.isfinite(covariance).all():
-        step = _last_step(slopes, residuals, data, weights, covariance, unknowns)
+    unknowns, deviations = _begun(curves, data, start, bounds, beginning)
+    result, deviations, evaluations, message = _settled(curves, data, unknowns, deviations, bounds, effort)
+    unknowns, at_bounds = result.x, result.active_mask != 0
+    residuals, slopes, wide = curves.values(unknowns) - data.measured, curves.slopes(unknowns), stretch(unknowns)
+    found = spreads(slopes, residuals, data, deviations, unknowns, wide)
+    if data.loss == "linear" and _is_last(found.step, wide, found.covariance) and not at_bounds.any():
+        step = found.step * wide
         unknowns, residuals = np.clip(unknowns + step, *bounds), residuals + slopes @ step
-    fit = _misfit(residuals, data, weights, unknowns)
-    return Estimate(unknowns, covariance, weights, residuals, directions, spreads, at_bounds, evaluations, message, fit)
+    deviance = _deviance(residuals, data, deviations, unknowns)
+    told = (found.directions, found.spreads, found.step, bounds, at_bounds)
+    return Estimate(
+        unknowns, found.covariance, found.freedom, deviations, residuals, *told, evaluations, message, deviance
+    )
 
 
-def _misfit(residuals: Array, data: Data, deviations: Array, unknowns: Array) -> float:
+def _is_last(step: Array, stretch: Array, covariance: Array) -> bool:
+    """Whether derivatives that are there already tell a small step to the minimum."""
+    return bool((np.abs(step) <= 1e-4 * np.sqrt(np.diag(covariance))).all() and (np.abs(step * stretch) < 0.01).all())
+
+
+def _deviance(residuals: Array, data: Data, deviations: Array, unknowns: Array) -> float:
     rho, _, _ = LOSSES[data.loss]((residuals / deviations[data.series]) ** 2)
-    beside = np.nansum(((unknowns - data.priors) / data.prior_deviations) ** 2)
-    return float(rho.sum() + 2 * data.counts @ np.log(deviations) + beside)
+    return float(rho.sum() + 2 * data.counts @ np.log(deviations) + (data.pull(unknowns) ** 2).sum())
 
 
 def _begun(
@@ -160,18 +152,20 @@ def _begun(
     residuals = curves.values(start) - data.measured
     if not np.isfinite(residuals).all():
         raise SimulationError("At the start values the motion has no finite values. Start from other values.")
-    weights = _noise(residuals, data, 0) if data.deviations is None else data.deviations
+    deviations = _noise(residuals, data, data.counts) if data.deviations is None else data.deviations
     if beginning is None or not beginning[1].any():
-        return start, weights
-    unknowns = _led(curves, data, weights, start, bounds, *beginning)
-    return unknowns, _noise(curves.values(unknowns) - data.measured, data, 0) if data.deviations is None else weights
+        return start, deviations
+    unknowns = _led(curves, data, deviations, start, bounds, *beginning)
+    if data.deviations is None:
+        deviations = _noise(curves.values(unknowns) - data.measured, data, data.counts)
+    return unknowns, deviations
 
 
 def _settled(
-    curves: Curves, data: Data, unknowns: Array, weights: Array, bounds: tuple[Array, Array], effort: tuple[int, int]
+    curves: Curves, data: Data, unknowns: Array, deviations: Array, bounds: tuple[Array, Array], effort: tuple[int, int]
 ) -> tuple[Any, Array, int, str]:
     """Scipy's last result, deviations (series,), motions computed, and why it is no minimum, if it is none."""
-    alone = weights.size == 1 and data.loss == "linear" and np.isnan(data.priors).all()
+    alone = deviations.size == 1 and data.loss == "linear" and np.isnan(data.priors).all()
     settled, evaluations, message = data.deviations is not None or alone, 0, ""
     # A ten-thousandth of its deviation is the last step, which derivatives tell to more than that.
     last_gain = 1e-8 / data.measured.size
@@ -179,26 +173,17 @@ def _settled(
     for _ in range(rounds):
         # While the deviations change, the minimum moves with them.
         gain = last_gain if settled else 1e-5
-        last, result = settled, _fitted(curves, data, weights, unknowns, bounds, gain, motions)
+        last, result = settled, _fitted(curves, data, deviations, unknowns, bounds, gain, motions)
         evaluations += int(result.nfev)
         message = "" if result.status > 0 else str(result.message).rstrip(".")
         unknowns = result.x
         if data.deviations is None:
-            residuals = result.fun[: data.measured.size] * weights[data.series]
-            before, weights = weights, _noise(residuals, data, unknowns.size)
-            settled = alone or bool((np.abs(weights - before) <= 1e-4 * weights).all())
+            residuals, before = result.fun[: data.measured.size] * deviations[data.series], deviations
+            deviations = _noise(residuals, data, degrees(curves.slopes(unknowns), data, before))
+            settled = alone or bool((np.abs(deviations - before) <= 1e-4 * deviations).all())
         if settled and last:
-            return result, weights, evaluations, message
-    return result, weights, evaluations, message or f"the noise has not settled in {rounds} rounds"
-
-
-def _last_step(
-    slopes: Array, residuals: Array, data: Data, deviations: Array, covariance: Array, unknowns: Array
-) -> Array:
-    """(m,) to the minimum, as far as derivatives that are there already tell; zero where it is no small step."""
-    pull = np.where(np.isnan(data.priors), 0.0, (unknowns - data.priors) / data.prior_deviations**2)
-    step = -covariance @ (slopes.T @ (residuals / deviations[data.series] ** 2) + pull)
-    return step * (np.abs(step) <= 1e-4 * np.sqrt(np.diag(covariance))).all()
+            return result, deviations, evaluations, message
+    return result, deviations, evaluations, message or f"the noise has not settled in {rounds} rounds"
 
 
 def _led(
@@ -223,17 +208,16 @@ def _led(
     return nearer if near.sum() < far.sum() else start
 
 
-def _noise(residuals: Array, data: Data, unknowns: int) -> Array:
-    """(series,) standard deviations of the noise from what is left."""
+def _noise(residuals: Array, data: Data, freedom: Array) -> Array:
+    """(series,) standard deviations of the noise from what is left, with degrees of freedom (series,)."""
     count = len(data.counts)
-    if data.loss != "linear":  # the median of a normal distribution's sizes is 0.6745 of its deviation
-        sizes = [np.median(np.abs(residuals[data.series == k])) / 0.6745 for k in range(count)]
+    if data.loss != "linear":
+        sizes = np.array([robust_size(residuals[data.series == k], freedom[k]) for k in range(count)])
     else:
-        freedom = np.maximum(data.counts * (1 - unknowns / data.measured.size), 1.0)
-        sizes = np.sqrt(np.bincount(data.series, residuals**2) / freedom).tolist()
-    heights = [np.abs(data.measured[data.series == k]).max() for k in range(count)]
+        sizes = np.sqrt(np.bincount(data.series, residuals**2) / np.maximum(freedom, EQUAL))
+    heights = np.array([np.abs(data.measured[data.series == k]).max() for k in range(count)])
     # A record without noise is fitted to rounding.
-    return np.maximum(sizes, 1e-12 * np.maximum(heights, np.finfo(float).tiny))
+    return np.asarray(np.maximum(sizes, 1e-12 * np.maximum(heights, np.finfo(float).tiny)))
 
 
 def _fitted(
@@ -283,32 +267,3 @@ def _fitted(
         gtol=EPS,
         max_nfev=motions,
     )
-
-
-def _spread(
-    slopes: Array, residuals: Array, data: Data, deviations: Array, fixed: NDArray[np.bool_]
-) -> tuple[Array, Array, Array]:
-    """Covariance, and combinations of the unknowns with their standard deviations; what is at a bound stays there."""
-    free = np.flatnonzero(~fixed)
-    J, away = slopes[:, free] / deviations[data.series, None], residuals / deviations[data.series]
-    _, weight, bend = LOSSES[data.loss](away**2)
-    steepness = np.bincount(data.series, weight + 2 * away**2 * bend) / data.counts
-    expected = np.where(np.isnan(data.priors), 0.0, 1 / data.prior_deviations)
-    apart = np.diag(expected)[:, free]
-    _, sizes, rows = np.linalg.svd(
-        np.vstack([J * np.sqrt(steepness[data.series])[:, None], apart]), full_matrices=False
-    )
-    seen = sizes > EQUAL * sizes.max(initial=0.0)  # below, it is an error of the derivatives
-    spreads = np.where(seen, 1 / np.where(seen, sizes, 1.0), np.inf)
-    inverse = (rows[seen].T * spreads[seen] ** 2) @ rows[seen]
-    within = inverse
-    if data.loss != "linear":
-        pull = J * (weight * away)[:, None]
-        within = inverse @ (pull.T @ pull + apart.T @ apart) @ inverse
-    hidden = np.flatnonzero((np.abs(rows[~seen]) > EQUAL).any(axis=0))
-    within[hidden, hidden] = np.inf
-    covariance = np.full((fixed.size, fixed.size), np.nan)
-    covariance[np.ix_(free, free)] = within
-    directions = np.zeros((free.size, fixed.size))
-    directions[:, free] = rows
-    return covariance, directions, spreads

@@ -24,11 +24,13 @@ from shaftwork.fitting.curves import (
     recorded_motion,
     sizes_of,
 )
-from shaftwork.fitting.estimation import LOSSES, Data
+from shaftwork.fitting.estimation import Estimate
 from shaftwork.fitting.fit_result import AT_START, Fit
 from shaftwork.fitting.fitted_records import RecordedSeries, read_records
 from shaftwork.fitting.several_starts import estimates, starts_from
+from shaftwork.fitting.spreads import LOSSES, Data
 from shaftwork.network.netlist import Netlist
+from shaftwork.numerics.tolerances import TYPED
 from shaftwork.pipeline.arguments import checked_parameter, checked_parameters, range_of, relative_tolerance, repeated
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import refuse_motion
@@ -62,8 +64,8 @@ def fit(
 
     Law: least squares of what is computed less what is measured, each in standard deviations of its noise, with the
     derivatives of `studies.trajectory_sensitivities`, exact through all events; where there are none (frequency
-    responses, sampled controllers, more than some hundred states) central differences. A parameter that must stay
-    above zero is fitted by its logarithm.
+    responses, sampled controllers, more than some hundred states) central differences. A parameter that stays above
+    zero is fitted by its logarithm, and so is its interval, but for what may be zero, a damping or a gap.
 
     The intervals hold for a model that is right, and for noise that is white: then the `correlation` of neighbouring
     residuals is near zero. Where it is not, something is missing in the model, or samples are closer than the noise
@@ -79,7 +81,9 @@ def fit(
             (low, high), None leaves a side open.
         start: values of unknowns to start from; by default those of the network, and of `initial`.
         sigma: standard deviation of the noise in SI, one or by quantity; by default it is estimated from the record.
-        priors: by name (value, standard deviation), what is known of an unknown without the record.
+            Of several records quantities are named "shaft.tau (1)", "shaft.tau (2)", ...
+        priors: by name (value, standard deviation), what is known of an unknown without the record; of a parameter
+            above zero its logarithm is taken to have a normal distribution, of deviation (standard deviation / value).
         loss: "linear", or for records with outliers "soft_l1", "huber" or "cauchy", see scipy's `least_squares`.
         initial: start values of states; of several records a list, one mapping for each, where they differ.
         parameters: values of other parameters where they differ from the network's, likewise one or a list.
@@ -96,7 +100,7 @@ def fit(
         SimulationError: the motion at the start cannot be computed.
 
     Warns:
-        AccuracyWarning: what is left is plainly no noise, so that the intervals do not hold.
+        AccuracyWarning: what is left is no white noise, or more than `sigma`, so that the intervals do not hold.
     """
     if whole(starts) is None or whole(seed, 0) is None:
         raise ParameterError(f"starts = {starts!r} must be a whole number, 1 or more, and seed = {seed!r} 0 or more.")
@@ -123,13 +127,33 @@ def fit(
     curves = ScaledCurves(sources, fitted.scaling)
     data = _data(tuple(series.values()), sigma, *_priors(priors, fitted.scaling), loss)
     bounds, beginning = (fitted.low, fitted.high), _beginning(sources, fitted.scaling)
-    best, *others = estimates(curves, data, starts_from(fitted.start, bounds, starts, seed), bounds, beginning)
+    first_points = starts_from(fitted.scaling, fitted.start, bounds, starts, seed)
+    best, *others = estimates(curves, data, first_points, bounds, beginning, fitted.scaling.stretch)
+    _refuse_rest(best, data, tuple(series))
     samples = {name: one.at for name, one in series.items()}
     differences, ends = curves.by_differences, tuple(others)
     result = Fit(net, fitted.units, fitted.scaling, samples, data, best, domain, usual, differences, ends, starts)
     if result.caveat:
         warn(result.caveat, AccuracyWarning)
     return result
+
+
+def _refuse_rest(best: Estimate, data: Data, names: Sequence[str]) -> None:
+    """Refuse records whose noise a robust loss cannot tell, because most of their values are met to rounding.
+
+    Raises:
+        ParameterError: there is one.
+    """
+    if data.loss == "linear" or data.deviations is not None:
+        return
+    for number, name in enumerate(names):
+        largest = np.abs(best.residuals[data.series == number]).max()
+        if best.deviations[number] <= TYPED * largest:
+            raise ParameterError(
+                f"Half of the values of '{name}' or more are met to rounding, as where a drive stands still, so "
+                f"loss={data.loss!r} cannot tell its noise. Give sigma={{'{name}': ...}}, leave these values out, or "
+                "take loss='linear'."
+            )
 
 
 class _Unknowns(NamedTuple):
@@ -227,7 +251,9 @@ def _unknowns(model: Model, ranges: Mapping[str, Range], start: Mapping[str, flo
                 f"'{name}' = {start[name]:g} is where the fit starts, and must lie between {low:g} and {high:g}. Give "
                 "another one, start={...}, or another range."
             )
-    scaling = Scaling(start, np.array([start[name] > 0 <= low for name, (low, _) in ends.items()]), sizes)
+    positive = np.array([start[name] > 0 <= low for name, (low, _) in ends.items()])
+    to_zero = np.array([parameter is None or parameter.above is None for parameter in declared.values()])
+    scaling = Scaling(start, positive, sizes, to_zero)
     units = {name: AT_START if parameter is None else parameter.unit for name, parameter in declared.items()}
     sides = (np.array(values) for values in (list(start.values()), *zip(*ends.values(), strict=True)))
     return _Unknowns(scaling, units, *map(scaling.unknowns, sides))
@@ -293,10 +319,13 @@ def _deviations(sigma: Any, names: Sequence[str]) -> Array | None:
     """(series,) standard deviations of the noise, or None."""
     if sigma is None:
         return None
-    if isinstance(sigma, Mapping) and (missing := [name for name in names if name not in sigma]):
-        raise ParameterError(
-            f"sigma has no value for '{missing[0]}'. Give one for each quantity of the record, or none."
-        )
+    if isinstance(sigma, Mapping):
+        if missing := [name for name in names if name not in sigma]:
+            raise ParameterError(
+                f"sigma has no value for '{missing[0]}'. Give one for each quantity of the record, or none."
+            )
+        if others := [name for name in sigma if name not in names]:
+            raise ParameterError(f"sigma names '{others[0]}', which is not recorded. There are: {', '.join(names)}.")
     values = [sigma[name] if isinstance(sigma, Mapping) else sigma for name in names]
     return np.array([in_si("sigma", value, "1", above=0) for value in values])
 

@@ -8,13 +8,13 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import stats
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.notebook import html_table
 from shaftwork.core.screen import counted, in_columns
 from shaftwork.fitting.curves import Scaling
-from shaftwork.fitting.estimation import Data, Estimate
+from shaftwork.fitting.estimation import Estimate
+from shaftwork.fitting.spreads import LOSSES, Data
 from shaftwork.numerics.tolerances import EQUAL
 from shaftwork.pipeline.network import Network, with_values
 from shaftwork.results.plotting import new_figure, plain
@@ -84,33 +84,40 @@ class Fit:
 
     @property
     def deviations(self) -> dict[str, float]:
-        """Standard deviations of the parameters in SI; infinite where the record tells nothing, NaN at a bound."""
-        slopes = self.scaling.slopes(self.estimate.unknowns)
-        sizes = np.sqrt(np.diag(self.estimate.covariance)) * slopes
+        """Standard deviations of the parameters in SI; infinite where the record tells nothing."""
+        at = self.estimate.unknowns
+        sizes = self.estimate.sizes * self.scaling.slopes(at) * self.scaling.stretch(at)
         return dict(zip(self.scaling.names, sizes.tolist(), strict=True))
 
     def intervals(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
         """Confidence intervals by parameter, in SI.
 
         Law: t-quantiles of the scaled unknowns, of a normal distribution where `sigma` was given. So the interval of a
-        parameter that stays above zero does as well.
+        parameter that stays above zero does as well. That of a damping, a gap or another one that may be zero is even
+        on both sides. Where a parameter ended at a bound, the interval is what there were without it. All are cut at
+        their bounds.
 
         Args:
             level: the share of records whose interval holds the true value.
         """
-        freedom = self.data.measured.size - len(self.scaling.names)
-        quantile = (1 + level) / 2
-        width = stats.norm.ppf(quantile) if self.data.deviations is not None else stats.t.ppf(quantile, max(freedom, 1))
-        reach = width * np.sqrt(np.diag(self.estimate.covariance))
-        low, high = (self.scaling.values(self.estimate.unknowns + sign * reach) for sign in (-1.0, 1.0))
+        found = self.estimate
+        reach = found.reach(level)
+        middle = np.where(self.scaling.to_zero | found.at_bounds, found.step, 0.0)
+        low, high = (self.scaling.ends(found.unknowns, middle + sign * reach, found.bounds) for sign in (-1.0, 1.0))
         return dict(zip(self.scaling.names, zip(low.tolist(), high.tolist(), strict=True), strict=True))
 
     @property
     def correlations(self) -> Array:
-        """(m, m) of the fitted parameters: near one or minus one where the record tells them apart hardly."""
-        sizes = np.sqrt(np.diag(self.estimate.covariance))
-        with np.errstate(invalid="ignore"):
-            return np.asarray(self.estimate.covariance / np.outer(sizes, sizes))
+        """(m, m) of the fitted parameters: near one or minus one where the record tells them apart hardly.
+
+        Of those that it does not tell at all they are those of what it does not tell.
+        """
+        found = self.estimate
+        unseen = found.directions[np.isinf(found.spreads)]
+        hidden = np.isinf(np.diag(found.covariance))
+        covariance = np.where(hidden[:, None] & hidden, unseen.T @ unseen, found.covariance)
+        sizes = np.sqrt(np.diag(covariance))
+        return np.where(hidden[:, None] != hidden, 0.0, covariance / np.outer(sizes, sizes))
 
     @property
     def unseen(self) -> tuple[tuple[float, dict[str, float]], ...]:
@@ -133,21 +140,46 @@ class Fit:
     def caveat(self) -> str:
         """Why the intervals do not hold; empty where what is left may be noise.
 
-        Law: the correlation of neighbouring residuals is above 0.5 and three standard deviations of that of white
-        noise, and what is left is above a millionth of the largest value, which may be errors of computation.
+        Law: the correlation of neighbouring residuals is above three standard deviations of that of white noise, and
+        what is left is above a millionth of the largest value, which may be errors of computation. From a correlation
+        of 0.5 on the model is to blame. Where `sigma` is given, its mean square is five standard deviations above it.
         """
-        apart = [
-            name
-            for name, values in self.measured.items()
-            if self.correlation[name] > max(0.5, 3 / len(values) ** 0.5)
-            and self.noise[name] > EQUAL * np.abs(values).max()
+        measured, correlation, parts = self.measured, self.correlation, list[str]()
+        left = {name: self._left(number) for number, name in enumerate(self.samples)}
+        alike = {
+            name: correlation[name]
+            for name, values in measured.items()
+            if correlation[name] > 3 / len(values) ** 0.5
+            and self.noise[name] * left[name] > EQUAL * np.abs(values).max()
+        }
+        if apart := [name for name, share in alike.items() if share > 0.5]:
+            parts.append(
+                f"The model does not follow the record of {', '.join(apart)}: neighbouring residuals are alike, so "
+                "what is left is no noise, and the intervals do not hold. Take other starts, starts=8, or add what the "
+                "model lacks."
+            )
+        elif alike:
+            wider = max(((1 + share) / (1 - share)) ** 0.5 for share in alike.values())
+            parts.append(
+                f"Neighbouring residuals of {', '.join(alike)} are alike: true intervals are some {wider:.2g} times as "
+                "wide. Take samples farther apart, or add what the model lacks."
+            )
+        parts += [
+            f"What is left of {name} is {left[name]:.2g} times the sigma that was given, so the intervals are too "
+            "narrow. Leave sigma out, or add what the model lacks."
+            for name, values in measured.items()
+            if self.data.deviations is not None and left[name] ** 2 > 1 + 5 * (2 / len(values)) ** 0.5
         ]
-        if not apart:
-            return ""
-        return (
-            f"The model does not follow the record of {', '.join(apart)}: neighbouring residuals are alike, so what is "
-            "left is no noise, and the intervals do not hold. Take other starts, starts=8, or add what the model lacks."
-        )
+        begun = min(float(at[0]) for at in self.samples.values())
+        if parts and self.domain == "t" and 2 * begun > max(float(at[-1]) for at in self.samples.values()):
+            parts.append(f"Times count from the start of the motion, and the record begins at {begun:.6g} s.")
+        return " ".join(parts)
+
+    def _left(self, number: int) -> float:
+        """How large what is left of a series is, in deviations of its noise; outliers of a robust loss count little."""
+        away = self.estimate.residuals[self.data.series == number] / self.estimate.deviations[number]
+        _, weight, _ = LOSSES[self.data.loss](away**2)
+        return float((weight * away**2).mean() ** 0.5)
 
     @cached_property
     def residuals(self) -> dict[str, Array]:
@@ -218,11 +250,17 @@ class Fit:
         notes += [self.caveat] if self.caveat else []
         if self.estimate.message:
             notes.append(f"This is no minimum yet: {self.estimate.message}.")
+        if not self.estimate.freedom.all():
+            notes.append("There are as many unknowns as values to tell the noise by. Give more of them, or sigma.")
         if self.by_differences:
             notes.append("Derivatives by differences.")
+        gone = self.estimate.unknowns < self.scaling.floor
+        ends = zip(gone.tolist(), self.intervals(level).items(), strict=True)
+        if zeros := [name for small, (name, (low, _)) in ends if small and low == 0.0]:
+            notes.append(f"As well zero as not, for all that the record tells: {', '.join(zeros)}.")
         ended = [name for name, ends in zip(self.scaling.names, self.estimate.at_bounds.tolist(), strict=True) if ends]
         if ended:
-            notes.append(f"At a bound, and without an interval: {', '.join(ended)}.")
+            notes.append(f"At a bound, by which its interval is cut: {', '.join(ended)}.")
         return title, ["", "fitted", "95 % from", "to", "start", "unit"], rows, notes
 
     def _told_of_starts(self) -> str:
@@ -233,7 +271,7 @@ class Fit:
             return told
         values = zip(self.scaling.names, self.scaling.values(other[0].unknowns).tolist(), strict=True)
         words = ", ".join(f"{name} = {value:.6g}" for name, value in values)
-        return f"{told} In the next one chi^2 is larger by {other[0].misfit - self.estimate.misfit:.3g}: {words}."
+        return f"{told} In the next one chi^2 is larger by {other[0].deviance - self.estimate.deviance:.3g}: {words}."
 
     def __str__(self) -> str:
         title, header, rows, notes = self._rows()

@@ -68,7 +68,10 @@ def _series(record: Any) -> tuple[str, dict[str, RecordedSeries]]:
             all values are at the start.
     """
     if not hasattr(record, "items"):
-        raise ParameterError(f"{reprlib.repr(record)} is no record. Give {{'t': times, 'shaft.tau': values}}.")
+        raise ParameterError(
+            f"{reprlib.repr(record)} is no record. Give {{'t': times, 'shaft.tau': values}}, or what "
+            "pandas.read_csv has read of a file."
+        )
     columns = {str(name): values for name, values in record.items()}
     domains = [name for name in ("t", "f") if name in columns]
     if len(domains) != 1 or len(columns) < 2:
@@ -101,7 +104,9 @@ def _one_series(name: str, column: Any, at: Array, domain: str) -> RecordedSerie
     try:
         ordered = values[order].astype(float if domain == "t" else complex)
     except (TypeError, ValueError):
-        raise ParameterError(f"'{name}' holds something else than numbers: {reprlib.repr(column)}.") from None
+        raise ParameterError(
+            f"'{name}' holds something else than numbers, {values.ravel()[0]!r} first. Drop the column."
+        ) from None
     there = np.isfinite(ordered)
     if not there.any():
         raise ParameterError(f"'{name}' has no finite value.")
