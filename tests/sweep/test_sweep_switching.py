@@ -121,6 +121,43 @@ def test_the_bits_of_variants_that_switch_do_not_depend_on_those_beside_them(
             assert made.measures[measure].tobytes() == sweeps[0].measures[measure].tobytes()
 
 
+def clutched(*, torque: float = 10.0, restitution: float = 0.0) -> sw.Network:
+    """A friction beside a clutch that runs against a stop: in the end the friction and the clutch stop at once."""
+    net = sw.Network("against a stop")
+    net.add(sw.TorqueSource("motor", tau=sw.Step(3.0) - sw.Step(6.0, start=2.0)), "a")
+    net.add(sw.Inertia("J1", J=0.3), "a")
+    net.add(sw.CoulombLoad("load", tau=1.5), "a")
+    net.add(sw.Clutch("clutch", tau=torque, t_on=0.4), "a", "b")
+    net.add(sw.Inertia("J2", J=0.6), "b")
+    net.add(sw.HardStop("stop", upper=0.25, restitution=restitution), "b")
+    return net
+
+
+@pytest.mark.parametrize("net", [clutched(), clutched(torque=3.0), clutched(restitution=0.23)])
+def test_of_what_stops_at_once_the_same_holds_as_in_a_single_run(net: sw.Network) -> None:
+    """What a friction and a clutch each carry at rest is one of many; side by side it was another one than alone."""
+    measures = ["end load.tau", "end clutch.tau", "mean load.tau", "mean clutch.tau"]
+    inertias = np.linspace(0.3, 0.4, 16)
+    for t_end in (1.9, 3.0):  # at rest, and after the motor has turned back
+        fast = sweep(net, {"J1.J": inertias}, t_end=t_end, measures=measures, processes=1)
+        slow = sweep(net, {"J1.J": inertias[[0, 9]]}, t_end=t_end, measures=measures, engine="numba", rtol=1e-10)
+        for name in measures:
+            # torques of 1.5 to 3 N m, to the tolerance of 1e-8 through some events
+            np.testing.assert_allclose(fast.measures[name][[0, 9]], slow.measures[name], atol=1e-7, err_msg=name)
+
+
+def test_a_brake_that_comes_on_after_a_lag_is_followed_in_every_variant() -> None:
+    net = sw.Network("lag")
+    net.add(sw.TorqueSource("motor", tau=10.0), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.Brake("brake", tau=30.0, t_on=1.2, t_lag=0.1), "a")
+    J = np.linspace(1.0, 2.0, 16)
+    made = sweep(net, {"J.J": J}, t_end=1.4, measures=["max J.omega", "end J.omega"], processes=1)
+    for name, late in (("max J.omega", 0.1 * np.log(1.5)), ("end J.omega", 0.2)):  # the torque comes to 10 N m, the end
+        momentum = 12.0 - 20.0 * late + 3.0 * (1 - np.exp(-late / 0.1))
+        np.testing.assert_allclose(made.measures[name], momentum / J, rtol=1e-8)
+
+
 def test_rigid_flanks_throw_back_what_newtons_law_says() -> None:
     """One wheel hits another that rests: momentum is kept, and the speed across comes back with the restitution."""
     random, tau, gap = np.random.default_rng(5), 10.0, 0.1

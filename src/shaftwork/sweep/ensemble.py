@@ -317,12 +317,27 @@ class _VariantCourse:
         """Past a guard, the lanes in which what follows is beyond doubt."""
         p = equations.parameters(self.columns[:, group.lanes])
         here = equations.code.program.points(group.t, group.x, p)
-        alone = equations.alone(guard, group.t, group.x, p, (here["rates"], here["guards"]))
-        group = group.some(alone)
-        if not group.lanes.size:
-            return []
-        struck = self.ensemble.struck(group, guard, self.columns[:, group.lanes])
-        return struck or self._changed(equations, group, guard, (p[:, alone], here["stored"][:, alone]))
+        instant = group.t, group.x, p, (here["rates"], here["guards"])
+        alone, stored = equations.alone(guard, *instant), here["stored"]
+        groups, left = list[VariantGroup](), ~alone
+        if alone.any():
+            some = group.some(alone)
+            groups = self.ensemble.struck(some, guard, self.columns[:, some.lanes])
+            groups = groups or self._changed(equations, some, guard, (p[:, alone], stored[:, alone]))
+        for first, there in equations.at_once(guard, *instant) if left.any() else ():
+            on = left & there
+            for new in self._changed(equations, group.some(on), first, (p[:, on], stored[:, on])):
+                groups.append(new.some(self._consistent(new)))
+                left &= ~np.isin(group.lanes, groups[-1].lanes)
+        return groups
+
+    def _consistent(self, group: VariantGroup) -> Mask:
+        """(k,) whether nothing more is met at this instant."""
+        equations = self.ensemble.equations(group.modes)
+        assert equations is not None  # noqa: S101 (a group has come there)
+        p = equations.parameters(self.columns[:, group.lanes])
+        begin, *_ = equations.pieces(group.t, p, self.ensemble.span)
+        return np.asarray(equations.entered(begin, group.x, p).met == Met.NOTHING)
 
     def _changed(
         self, before: EnsembleEquations, group: VariantGroup, guard: int, of_lanes: tuple[Array, Array]

@@ -23,6 +23,8 @@ from shaftwork.sweep.lane_tables import Met
 
 Mask = NDArray[np.bool_]
 Texts = NDArray[np.object_]
+Motion = tuple[Array, Array]
+"""Rates (n, k) of states, and guards (guards, k)."""
 ModeNames = tuple[str, ...]
 """The mode of every element; empty where no part changes its mode."""
 
@@ -154,9 +156,13 @@ class EnsembleEquations:
         """Whether the modes are consistent with the motion in lanes (k,): without guards they are."""
         return PhaseEntry(np.full(t.size, Met.NOTHING), np.zeros((0, t.size)))
 
-    def alone(self, guard: int, t: Array, x: Array, p: Array, motion: tuple[Array, Array]) -> Mask:  # noqa: ARG002
+    def alone(self, guard: int, t: Array, x: Array, p: Array, motion: Motion) -> Mask:  # noqa: ARG002
         """(k,) whether no other guard is near its limit where one is met; there is none."""
         return np.ones(t.size, dtype=bool)
+
+    def at_once(self, guard: int, t: Array, x: Array, p: Array, motion: Motion) -> list[tuple[int, Mask]]:  # noqa: ARG002
+        """Guards of which one may go first where several are met at once, and the lanes (k,); there is none."""
+        return []
 
     def leaves_behind(self, before: EnsembleEquations, guard: int) -> bool:
         """Whether the guard by which these modes were entered is met no more; `entered` looks at all the others."""

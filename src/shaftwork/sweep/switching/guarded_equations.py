@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -18,8 +19,10 @@ from shaftwork.hybrid.consistency import (
     side_of_limit,
     time_scales,
 )
+from shaftwork.hybrid.hybrid_state import slipping
 from shaftwork.hybrid.modes.mode_equations import ModeEquations
-from shaftwork.sweep.ensemble_equations import EnsembleCode, EnsembleEquations, Mask, ModeNames, PhaseEntry
+from shaftwork.hybrid.modes.mode_machines import ActiveGuard
+from shaftwork.sweep.ensemble_equations import EnsembleCode, EnsembleEquations, Mask, ModeNames, Motion, PhaseEntry
 from shaftwork.sweep.lane_tables import Met
 
 Course = tuple[Array, Array, Array, Array]
@@ -78,27 +81,52 @@ class GuardedEquations(EnsembleEquations):
         met = np.where(count == 0, Met.NOTHING, np.where(count == 1, beyond.argmax(axis=0), Met.GIVEN_UP))
         return PhaseEntry(met, clear_of_limit(excess, bands))
 
-    def alone(self, guard: int, t: Array, x: Array, p: Array, motion: tuple[Array, Array]) -> Mask:
+    def alone(self, guard: int, t: Array, x: Array, p: Array, motion: Motion) -> Mask:
         """(k,) whether a guard is met alone; of several at one instant, it takes more to tell which goes first.
 
         Two contacts in a row that carry the same torque reach zero together: one of them opens, and the other stays.
+        A drive that a brake and its friction stop at once is held by one of them. What slips at rest may hold now.
         """
-        others = self._beside(guard)
-        if not others:
-            return super().alone(guard, t, x, p, motion)
-        rates, now = motion
-        near = self.code.motion(t + self._tick, moved_by_rounding(x, rates, self._moves, self._tick), p)[1]
-        within = self.sides[others, None] * now[others] < -CLEAR * np.abs(near - now)[others]
-        return np.asarray(within.all(axis=0))
+        others, (near, moving) = self._beside(guard), self._near(guard, t, x, p, motion)
+        return np.asarray(moving & self._within(others, motion[1], near).all(axis=0))
+
+    def at_once(self, guard: int, t: Array, x: Array, p: Array, motion: Motion) -> list[tuple[int, Mask]]:
+        """The guards that a speed ends together with one, and the lanes (k,) in which they are met, in their order."""
+        watched, (near, moving) = self.kirchhoff.watched(self.modes), self._near(guard, t, x, p, motion)
+        if not all(active.leave.by_speed for active in watched if active.guard == guard):
+            return []
+        guards = sorted({guard, *self._beside(guard)}, key=[active.guard for active in watched].index)
+        return [(k, moving & ((k == guard) | ~self._within([k], motion[1], near)[0])) for k in guards]
+
+    def _near(self, guard: int, t: Array, x: Array, p: Array, motion: Motion) -> tuple[Array, Mask]:
+        """Guards (guards, k) where rounding may have moved a lane, and (k,) whether nothing that slips is at rest."""
+        near = self.code.motion(t + self._tick, moved_by_rounding(x, motion[0], self._moves, self._tick), p)[1]
+        slips = {k: active for k, active in self._slips.items() if active.guard != guard}
+        idle = [active.guard for active in slips.values()]
+        held = any(active.leave.by_speed for k, active in slips.items() if k in self.kirchhoff.resting)
+        moving = ((motion[1][idle] != 0.0) | (near[idle] != 0.0)).all(axis=0)
+        return near, moving & (not held)
+
+    def _within(self, guards: Sequence[int], now: Array, near: Array) -> Mask:
+        """(some, k) whether guards are clear of their limits."""
+        return np.asarray(self.sides[guards, None] * now[guards] < -CLEAR * np.abs(near - now)[guards])
+
+    @cached_property
+    def _slips(self) -> dict[int, ActiveGuard]:
+        """The guards that end slipping, by machine."""
+        return slipping(self.kirchhoff.machines, self.modes, self.kirchhoff.watched(self.modes))
 
     def _beside(self, guard: int) -> list[int]:
-        """The guards that change what follows another one: of impacts all, and of what a torque ends the same kind."""
-        watched = self.kirchhoff.watched(self.modes)
-        met = [active.leave for active in watched if active.guard == guard]
-        hits, by_torque = (
-            any(of) for of in zip(*((one.rebound is not None, one.by_torque) for one in met), strict=True)
-        )
-        others = {active.guard for active in watched if hits or (by_torque and active.leave.by_torque)}
+        """The guards that change what follows another one: of impacts all, of what a torque or a speed ends those."""
+        watched, others = self.kirchhoff.watched(self.modes), set[int]()
+        for met in (active.leave for active in watched if active.guard == guard):
+            others |= {
+                active.guard
+                for active in watched
+                if met.rebound is not None
+                or (met.by_torque and active.leave.by_torque)
+                or (met.by_speed and active.leave.by_speed)
+            }
         return sorted(others - {guard})
 
     def slip(self, machine: int, guards: Array) -> Array:

@@ -130,11 +130,19 @@ class HybridEnsemble(Ensemble):
         met = [active for active in equations.watched(group.modes) if active.guard == guard]
         if len(met) != 1 or met[0].leave.rebound is not None:
             return []
-        crossed, number, count = met[0], met[0].machine, group.lanes.size
-        names = [crossed.leave.to] * count
-        if not crossed.leave.to:
-            before, parameters = group.modes[number], p[: len(equations.model.parameters)]
-            starts = zip(group.t.tolist(), group.x.T, parameters.T, strict=True)
-            names = [equations.start_of(number, before, *start) for start in starts]
-        targets = dict.fromkeys(names)
+        crossed, number = met[0], met[0].machine
+        names = [crossed.leave.to] * group.lanes.size if crossed.leave.to else self._anew(group, number, p)
+        targets = dict.fromkeys(name for name in names if name)
         return [(with_modes(group.modes, {number: to}), np.array([name == to for name in names])) for to in targets]
+
+    def _anew(self, group: VariantGroup, number: int, p: Array) -> list[str]:
+        """The mode of a machine in which each lane would start now, empty for none; see `mode_anew`."""
+        equations, before = self._equation_sets.of(group.modes), group.modes[number]
+        guarded, parameters = self._guarded(group.modes), p[: len(equations.model.parameters)].T
+        rates, _ = guarded.code.motion(group.t, group.x, p)
+        late = guarded.step(rates)
+        now, later = zip(group.t, group.x.T, strict=True), zip(group.t + late, (group.x + late * rates).T, strict=True)
+        return [
+            next((name for t, x in points if (name := equations.start_of(number, before, float(t), x, values))), "")
+            for points, values in zip(zip(now, later, strict=True), parameters, strict=True)
+        ]
