@@ -439,7 +439,7 @@ def test_a_controller_that_samples_is_fitted_by_differences() -> None:
         ({"start": {"shaft.c": "x"}}, "shaft"),
         ({"loss": "absolute"}, "no loss 'absolute'"),
         ({"starts": 0}, "starts = 0 must be a whole number"),
-        ({"seed": -1}, "seed = -1 0 or more"),
+        ({"seed": -1}, "seed = -1 must be a whole number, 0 or more"),
         ({"record": {"f": [1.0, 2.0], "shaft.tau": [1.0, 2.0]}}, "is no response"),
         ({"record": {"t": [1.0], "shaft.tau": [1.0]}, "unknowns": ["shaft.c", "shaft.d"]}, "1 values for 2 unknowns"),
     ],

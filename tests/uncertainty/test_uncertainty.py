@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from scipy import stats
 
 import shaftwork as sw
 from shaftwork.studies import uncertainty
+from shaftwork.uncertainty.draws import _values
 
 Columns = Mapping[str, NDArray[np.float64]]
 PI = float(np.pi)
@@ -96,12 +98,93 @@ def test_morris_finds_what_matters_and_what_acts_alone() -> None:
         method="morris",
         samples=10,
     ).indices("end J.omega")
-    # the change over the whole range, without any spread
-    assert [value for value, _ in linear["mu*"].values()] == pytest.approx([0.5, 1.0], rel=1e-7)
+    # the change from the 1 % to the 99 % quantile, without any spread
+    assert [value for value, _ in linear["mu*"].values()] == pytest.approx([0.49, 0.98], rel=1e-7)
     assert [value for value, _ in linear["sigma"].values()] == pytest.approx([0.0, 0.0], abs=1e-6)
     assert found["sigma"]["c"][0] > 1.0  # c acts with a alone
     with pytest.raises(sw.ParameterError, match="tell no distribution"):
         made.mean("y")
+
+
+def test_morris_ranks_all_distributions_by_the_change_over_the_same_range() -> None:
+    given = {
+        "pair": (0.0, 1.0),
+        "uniform": stats.uniform(2.0, 1.0),
+        "normal": stats.norm(1.0, 2.0),
+        "skew": stats.expon(),
+    }
+    found = uncertainty(lambda columns: {"y": sum(columns.values())}, given, method="morris", samples=10).indices("y")
+    for name, distribution in {**given, "pair": stats.uniform()}.items():
+        low, high = distribution.ppf([0.01, 0.99])  # type: ignore[union-attr]
+        assert found["mu*"][name][0] == pytest.approx(high - low, rel=1e-9)  # of a sum, but for rounding
+        assert found["sigma"][name][0] == pytest.approx(0.0, abs=1e-9)
+        assert np.isnan(found["sigma"][name][1])  # nobody estimates an interval of it
+
+
+@pytest.mark.parametrize("single", [[0.0, 1.0], stats.randint(1, 5), stats.binom(5, 0.5)])
+def test_morris_refuses_single_values_which_need_not_lie_in_equal_steps(single: object) -> None:
+    with pytest.raises(sw.ParameterError, match=r"'b' has single values.*or take method='sobol'"):
+        uncertainty(ishigami, {"a": (0.0, 1.0), "b": single, "c": (0.0, 1.0)}, method="morris", samples=4)
+
+
+def test_no_error_of_the_mean_is_told_of_sobol_points() -> None:
+    made = uncertainty(lambda columns: {"y": columns["a"]}, {"a": (0.0, 1.0)}, method="sobol", samples=128)
+    mean, error = made.mean("y")
+    # the scatter of independent points would promise an error of 0.018
+    assert abs(mean - 0.5) < 1e-3
+    assert np.isnan(error)
+    assert "error" not in str(made)
+    assert "nan" not in str(made)
+
+
+def test_the_interval_of_a_probability_is_conservative_for_sobol_points() -> None:
+    found = [
+        uncertainty(
+            lambda columns: {"y": columns["a"] + columns["b"]},
+            dict.fromkeys("ab", (0.0, 1.0)),
+            method="sobol",
+            samples=64,
+            seed=seed,
+        ).probability("y", above=1.5)
+        for seed in range(40)
+    ]
+    assert all(
+        low < 0.125 < high for _, low, high in found
+    )  # the area of a triangle; of 95 % intervals 2 might miss it
+    # less than half the scatter of 128 independent points
+    assert np.std([value for value, _, _ in found]) < 0.5 * (0.125 * 0.875 / 128) ** 0.5
+
+
+@pytest.mark.parametrize("method", ["sobol", "morris"])
+def test_the_level_sets_the_width_of_the_intervals_of_indices(method: str) -> None:
+    def halves(level: float) -> list[float]:
+        made = uncertainty(ishigami, dict.fromkeys("abc", (-PI, PI)), method=method, samples=64, level=level)
+        assert f"+- ({100 * level:g} %)" in str(made)
+        leading = next(iter(made.indices("y").values()))
+        return [half for _, half in leading.values()]
+
+    # the same seed draws the same resamples, whose deviation is multiplied by the quantile of a normal distribution
+    factor = stats.norm.ppf(0.995) / stats.norm.ppf(0.75)
+    assert halves(0.99) == pytest.approx([factor * half for half in halves(0.5)], rel=1e-9)
+
+
+def test_the_level_sets_the_width_of_the_interval_of_a_probability() -> None:
+    for level in (0.5, 0.99):
+        made = uncertainty(lambda columns: {"y": columns["a"]}, {"a": (0.0, 1.0)}, samples=400, level=level)
+        value, low, high = made.probability("y", above=0.7)
+        # 400 samples are enough for the normal distribution to be right to some percent
+        width = 2 * stats.norm.ppf((1 + level) / 2) * (value * (1 - value) / 400) ** 0.5
+        assert high - low == pytest.approx(width, rel=0.1)
+
+
+@pytest.mark.parametrize("seed", [-1, 1.5, "1", True, None])
+def test_a_seed_that_is_no_whole_number_is_refused(seed: Any) -> None:
+    words = r"seed = .* must be a whole number, 0 or more"
+    with pytest.raises(sw.ParameterError, match=words):
+        uncertainty(ishigami, dict.fromkeys("abc", (0.0, 1.0)), samples=4, seed=seed)
+    for values in ((1.0, 2.0), [1.0, 2.0]):
+        with pytest.raises(sw.ParameterError, match=words):
+            sw.studies.bands(two_motors(), "J.omega", [0.0, 1.0], {"one.tau": values}, seed=seed)
 
 
 def test_the_same_seed_gives_the_same_samples() -> None:
@@ -112,16 +195,34 @@ def test_the_same_seed_gives_the_same_samples() -> None:
     assert not (first == other).any()
 
 
-def test_a_failed_sample_counts_as_passing_a_limit() -> None:
+def test_a_probability_leaves_out_samples_that_failed_and_its_interval_holds_both_ways() -> None:
     def broken(columns: Columns) -> Columns:
-        return {"y": np.where(columns["a"] > 0.5, np.nan, 0.0)}
+        a = columns["a"]
+        return {"y": np.where(a > 0.5, np.nan, a), "whole": a}
 
     made = uncertainty(broken, {"a": (0.0, 1.0)}, samples=400)
-    assert made.probability("y", above=1.0).value == made.sweep.failed.mean() > 0.4
-    assert made.probability("y", above=1.0).low == 0.0  # nothing is known of them
-    assert made.values("y").size == 400 - made.sweep.failed.sum()
+    failed, a = int(made.sweep.failed.sum()), made.sweep.parameters["a"]
+    assert failed > 150
+    with pytest.warns(sw.AccuracyWarning, match=f"not known of {failed} samples of 400"):
+        found = made.probability("y", above=0.25)
+    passing = int(((a > 0.25) & (a <= 0.5)).sum())
+    assert found.value == passing / (400 - failed)
+    assert found.low == stats.binomtest(passing, 400).proportion_ci(0.95).low
+    assert found.high == stats.binomtest(passing + failed, 400).proportion_ci(0.95).high
+    assert made.values("y").size == 400 - failed
+    # another measure of the same samples is known of all
+    assert made.probability("whole", above=0.25).value == (a > 0.25).mean()
+    assert made.values("whole").size == 400
     with pytest.raises(sw.ParameterError, match="indices need all of them"):
         uncertainty(broken, {"a": (0.0, 1.0)}, samples=64, method="sobol").indices("y")
+
+
+def test_of_samples_that_all_failed_no_probability_is_told() -> None:
+    made = uncertainty(lambda columns: {"y": np.full(columns["a"].size, np.nan)}, {"a": (0.0, 1.0)}, samples=8)
+    with pytest.warns(sw.AccuracyWarning, match="8 samples of 8"):
+        value, low, high = made.probability("y", above=1.0)
+    assert np.isnan(value)
+    assert (low, high) == (0.0, 1.0)
 
 
 @pytest.mark.parametrize("side", ["above", "below"])
@@ -141,6 +242,13 @@ def test_what_is_shown_says_why_there_are_no_indices(method: str, names: str) ->
     said = rf"No {names}: \d+ samples of {len(found)} failed, and indices need all of them"
     assert re.search(said, str(found).splitlines()[-1])
     assert re.search(said, found._repr_html_())
+    if method == "sobol":  # the histograms alone
+        figure = found.plot()
+        assert len(figure.axes) == 1
+        assert "indices need all of them" in " ".join(figure.get_suptitle().split())
+    else:
+        with pytest.raises(sw.ParameterError, match=f"nothing to draw. {said}"):
+            found.plot()
     assert "failed, and" not in str(uncertainty(broken, {"a": (0.0, 1.0)}, samples=16))  # random: there are none anyway
 
 
@@ -158,7 +266,10 @@ def test_bands_hold_the_courses_and_the_mean() -> None:
 
 
 def test_a_sample_that_is_not_admissible_is_named() -> None:
-    for values, words in (([27.0, -1.0], "'J1': J = -1.0 must be"), (stats.norm(-27.0, 1.0), "The sample .*J1.*-2")):
+    for values, words in (
+        ([27.0, -1.0], "'J1': J = -1.0 must be"),
+        (stats.norm(-27.0, 1.0), r"'J1': J = -2.* in row \d+ of 'J1\.J'"),
+    ):
         with pytest.raises(sw.ParameterError, match=words):
             sw.studies.bands(sw.scenes.crane_start(), "shaft.tau", [0.0, 0.1], {"J1.J": values}, samples=None)
     with pytest.raises(sw.ParameterError, match=r"'one': tau = .* in row \d+ of 'one\.tau' must be a finite number"):
@@ -171,6 +282,58 @@ def test_a_sample_that_is_not_admissible_is_named() -> None:
 def test_what_a_function_is_given_are_numbers(ends: tuple[object, object]) -> None:
     with pytest.raises(sw.ParameterError, match=r"'a' = .* must be a"):
         uncertainty(lambda columns: {"y": columns["a"]}, {"a": ends}, samples=8)
+
+
+def late_motor() -> sw.Network:
+    """It goes off at 1 s: a motor that comes on later is none."""
+    net = sw.Network("late")
+    net.add(sw.KlossMotor("late", tau_k=1.0, s_k=0.2, n_sync=1500, t_on=0.1, t_off=1.0), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    return net
+
+
+def test_bands_leave_out_samples_that_fail_and_say_how_many() -> None:
+    net, t = late_motor(), np.linspace(0.0, 0.9, 4)
+    with pytest.warns(sw.AccuracyWarning, match=r"2 of 4 samples failed, the first, {'late.t_on': 2.0}: .*t_off"):
+        made = sw.studies.bands(net, "late.tau", t, {"late.t_on": [0.1, 2.0, 3.0, 0.2]})
+    assert made.parameters["late.t_on"].tolist() == [0.1, 0.2]
+    alone = sw.studies.bands(net, "late.tau", t, {"late.t_on": [0.1, 0.2]})
+    assert (made.courses == alone.courses).all()
+    assert made.plot().axes
+
+
+@pytest.mark.parametrize("values", [[2.0, 3.0], [0.1, 2.0, 3.0]])
+def test_bands_of_fewer_than_two_samples_are_an_error_that_says_why(values: list[float]) -> None:
+    with pytest.raises(
+        sw.SimulationError, match=rf"need two samples or more: 2 of {len(values)} samples failed.*t_off"
+    ):
+        sw.studies.bands(late_motor(), "J.omega", [0.0, 0.5], {"late.t_on": values})
+
+
+def test_courses_are_those_of_single_runs_with_the_options_of_a_sweep() -> None:
+    net, t = sw.scenes.crane_start(), np.linspace(0.0, 0.5, 6)
+    made = sw.studies.bands(net, "shaft.tau", t, {"shaft.c": [2e4, 3e4]}, engine="scipy")
+    for c, course in zip(made.parameters["shaft.c"], made.courses, strict=True):
+        single = net.compile().simulate(0.5, parameters={"shaft.c": c}, t_eval=t, engine="scipy")
+        assert (course == single["shaft.tau"]).all()
+    assert made.unit == "N*m"
+    with pytest.raises(sw.SignalError, match=r"shaft\.tua"):
+        sw.studies.bands(net, "shaft.tua", t, {"shaft.c": [2e4, 3e4]})
+    with pytest.raises(sw.ParameterError, match="t must be times in s that ascend"):
+        sw.studies.bands(net, "shaft.tau", [0.0, 0.1, 0.1], {"shaft.c": [2e4, 3e4]})
+
+
+def test_the_level_sets_the_width_of_bands() -> None:
+    t, uncertain = [0.0, 1.0], {"one.tau": stats.norm(3.0, 0.3)}
+    narrow, wide = (sw.studies.bands(two_motors(), "J.omega", t, uncertain, level=level) for level in (0.5, 0.99))
+    factor = stats.t.ppf(0.995, 99) / stats.t.ppf(0.75, 99)
+    assert np.ptp([band[-1] for band in wide.of_mean]) == pytest.approx(
+        factor * np.ptp([band[-1] for band in narrow.of_mean]), rel=1e-9
+    )
+    for made, level in ((narrow, 0.5), (wide, 0.99)):
+        low, high = made.of_courses
+        within = (low[-1] <= made.courses[:, -1]) & (made.courses[:, -1] <= high[-1])
+        assert within.mean() == pytest.approx(level, abs=0.011)  # one course of 100
 
 
 def test_bands_over_seeds_take_each_seed_once() -> None:
@@ -225,12 +388,12 @@ def test_pictures_and_tables_show_all_measures() -> None:
     assert "two.tau" in text
 
 
-def test_discrete_distributions_stay_within_their_values() -> None:
-    for distribution in (stats.randint(1, 5), stats.binom(5, 0.5)):
-        made = uncertainty(lambda columns: {"y": columns["a"]}, {"a": distribution}, method="morris", samples=20)
-        assert set(made.sweep.parameters["a"]) <= {float(k) for k in range(6)} - (
-            {0.0} if distribution.support()[0] else set()
-        )
+def test_the_least_share_of_a_distribution_has_a_value_of_it() -> None:
+    # a generator may draw 0 itself, where scipy's ppf gives one below the least value, or no finite one
+    zero = np.zeros(1)
+    assert _values(stats.randint(1, 5), zero) == 1.0
+    assert _values(stats.binom(5, 0.5), zero) == 0.0
+    assert np.isfinite(_values(stats.norm(), zero))
 
 
 def test_where_all_samples_fail_the_table_says_why() -> None:

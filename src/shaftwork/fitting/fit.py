@@ -31,7 +31,14 @@ from shaftwork.fitting.several_starts import estimates, starts_from
 from shaftwork.fitting.spreads import LOSSES, Data
 from shaftwork.network.netlist import Netlist
 from shaftwork.numerics.tolerances import TYPED
-from shaftwork.pipeline.arguments import checked_parameter, checked_parameters, range_of, relative_tolerance, repeated
+from shaftwork.pipeline.arguments import (
+    checked_parameter,
+    checked_parameters,
+    range_of,
+    relative_tolerance,
+    repeated,
+    seed_number,
+)
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import refuse_motion
 from shaftwork.pipeline.network import Network, network_of
@@ -102,8 +109,9 @@ def fit(
     Warns:
         AccuracyWarning: what is left is no white noise, or more than `sigma`, so that the intervals do not hold.
     """
-    if whole(starts) is None or whole(seed, 0) is None:
-        raise ParameterError(f"starts = {starts!r} must be a whole number, 1 or more, and seed = {seed!r} 0 or more.")
+    seed = seed_number(seed)
+    if whole(starts) is None:
+        raise ParameterError(f"starts = {starts!r} must be a whole number, 1 or more.")
     domain, records = read_records(record)
     initials, others, points = (
         _of_each(name, given, len(records))

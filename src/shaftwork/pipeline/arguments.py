@@ -142,6 +142,18 @@ def step_limit(max_steps: Any) -> int:
     return count
 
 
+def seed_number(seed: Any) -> int:
+    """A seed of random numbers.
+
+    Raises:
+        ParameterError: it is no number that seeds them.
+    """
+    number = whole(seed, 0)
+    if number is None:
+        raise ParameterError(f"seed = {seed!r} must be a whole number, 0 or more; the same one gives the same numbers.")
+    return number
+
+
 def absolute_tolerances(atol: Any, size: int) -> Array:
     """(states,) absolute tolerances.
 

@@ -4,16 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import stats
 
-from shaftwork.core.errors import ParameterError, SimulationError
-from shaftwork.core.screen import progress
+from shaftwork.codegen.model_observer import ModelObserver
+from shaftwork.core.errors import AccuracyWarning, NetworkWarning, ParameterError, SimulationError, no_quantity
+from shaftwork.core.notices import muted, warn
+from shaftwork.core.screen import counted
+from shaftwork.pipeline.arguments import seed_number
 from shaftwork.pipeline.network import Network, network_of
 from shaftwork.results.observer import Array, array_in_si
 from shaftwork.results.plotting import new_figure, plain
+from shaftwork.results.solution import Solution
+from shaftwork.sweep.sweep import sweep
+from shaftwork.sweep.sweep_result import Sweep
 from shaftwork.uncertainty.draws import Design, Distribution, distributions_in_si
 
 if TYPE_CHECKING:
@@ -29,9 +36,9 @@ class Bands:
         quantity: what is shown.
         unit: of it.
         t: (k,) times, s.
-        courses: (samples, k).
-        parameters: (samples,) values by parameter.
-        level: the share of courses, and of confidence.
+        courses: (samples, k), of those that did not fail.
+        parameters: (samples,) values by parameter, of these.
+        level: the share of courses, and of confidence, at each time by itself.
     """
 
     name: str
@@ -91,42 +98,87 @@ def bands(
 ) -> Bands:
     """Simulate samples of uncertain parameters, or all seeds of a noise, and show in which band a quantity stays.
 
+    The bands hold at each time by itself: more courses than the share leave the band at some time. Parameters are taken
+    as independent of each other.
+
     Args:
         net: the network.
         quantity: "shaft.tau".
         t: times in s, ascending.
         distributions: as in `uncertainty`; of one list, such as {"soil.seed": range(50)}, each value is taken once
             where `samples` is left out.
-        samples: how many.
+        samples: how many; by default 100.
         level: the share of courses within the band, and the confidence of the mean.
         seed: of the random numbers.
-        **options: of `Model.simulate`.
+        **options: of `sweep`: rtol, engine, initial, steady, processes, store and so on.
 
     Raises:
         ParameterError: an argument is out of its range, or a sample is not admissible; says which.
         SignalError: there is no such quantity.
-        SimulationError: a sample could not be simulated; says which.
+        SimulationError: fewer than two samples could be simulated; says why.
+
+    Warns:
+        AccuracyWarning: some samples failed and are missing in the bands; says how many and why the first one did.
     """
-    model, times = network_of(net).compile(), array_in_si("t", t, "s")
-    if not (times.size and np.isfinite(times).all() and (np.diff(times) >= 0.0).all()):
+    units, times = _units(net, quantity), array_in_si("t", t, "s")
+    if not (times.size and np.isfinite(times).all() and (np.diff(times) > 0.0).all()):
         raise ParameterError("t must be times in s that ascend, such as np.linspace(0.0, 1.0, 101).")
     if not 0.0 < level < 1.0:
         raise ParameterError(f"level = {level!r} must lie between 0 and 1.")
-    columns = _columns(distributions_in_si(net, distributions), samples, seed)
-    count = len(next(iter(columns.values())))
-    if count < 2:
+    columns = _columns(distributions_in_si(net, distributions), samples, seed_number(seed))
+    if len(next(iter(columns.values()))) < 2:
         raise ParameterError("A band needs two samples or more.")
-    courses, unit = np.empty((count, times.size)), ""
-    with progress(count, "samples", "compiling") as show:
-        for k in range(count):
-            values = {name: float(column[k]) for name, column in columns.items()}
-            try:
-                motion = model.simulate(float(times[-1]), parameters=values, t_eval=times, **options)
-            except (ParameterError, SimulationError) as error:
-                raise type(error)(f"The sample {values} could not be simulated: {error}") from error
-            courses[k], unit = motion[quantity], motion.observer.units[quantity]
-            show(k + 1, "bands")
-    return Bands(model.name, quantity, unit, times, courses, columns, level)
+    course = _Course()
+    measures = {f"{quantity} at {time!r} s": partial(course.at, quantity, k) for k, time in enumerate(times.tolist())}
+    found = sweep(net, samples=columns, t_end=float(times[-1]), t_eval=times, measures=measures, **options)
+    good = _good(found)
+    return Bands(
+        net.name, quantity, units[quantity], times, np.column_stack([*good.measures.values()]), good.parameters, level
+    )
+
+
+def _units(net: Network, quantity: str) -> Mapping[str, str]:
+    """By quantity.
+
+    Raises:
+        SignalError: that one is not among them.
+    """
+    with muted(NetworkWarning):  # the sweep compiles it as well, and warns
+        model = network_of(net).compile()
+    units = ModelObserver(model.form, model.bind).units
+    if quantity not in units:
+        raise no_quantity(quantity, model.name, units)
+    return units
+
+
+class _Course:
+    """A quantity over time, whose values a sweep measures one after the other in the order of time."""
+
+    def __init__(self) -> None:
+        self._values = np.empty(0)
+
+    def at(self, quantity: str, k: int, motion: Solution) -> float:
+        """The value at output time k."""
+        if k == 0:  # the first that is asked of each motion
+            self._values = motion[quantity]
+        return float(self._values[k])
+
+
+def _good(found: Sweep) -> Sweep:
+    """The samples that did not fail.
+
+    Raises:
+        SimulationError: fewer than two are left.
+    """
+    if not found.failed.any():
+        return found
+    first, failed = int(np.argmax(found.failed)), int(found.failed.sum())
+    values = {name: float(column[first]) for name, column in found.parameters.items()}
+    told = f"{failed} of {counted(len(found), 'sample')} failed, the first, {values}: {found.reasons[first]}"
+    if len(found) - failed < 2:
+        raise SimulationError(f"'{found.name}': no bands, which need two samples or more: {told}")
+    warn(f"'{found.name}': the bands are those of the other samples: {told}", AccuracyWarning)
+    return found.rows(~found.failed)
 
 
 def _columns(distributions: Mapping[str, Distribution], samples: int | None, seed: int) -> Mapping[str, Array]:

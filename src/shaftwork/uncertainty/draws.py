@@ -11,12 +11,16 @@ from numpy.typing import NDArray
 
 from shaftwork.core.errors import ParameterError, imported
 from shaftwork.core.parameters import in_si, whole
-from shaftwork.pipeline.arguments import checked_parameter
+from shaftwork.pipeline.arguments import checked_parameter, seed_number
 from shaftwork.pipeline.columns import Checked, column_in_si, has_many
 from shaftwork.pipeline.network import Network, network_of
 from shaftwork.results.observer import Array
 
 METHODS = ("random", "sobol", "morris")
+FINEST_SHARE = 2.0**-31
+"""Half the step of Sobol' points of 30 bits."""
+RANGE = (0.01, 0.99)
+"""Of every distribution, between which quantiles of it "morris" steps: an endless one has no others."""
 Distribution = Any
 """A frozen distribution of scipy.stats, (low, high) for a uniform one, or a list of values that are equally likely.
 
@@ -64,20 +68,33 @@ def _in_si(name: str, given: Any, checked: Checked) -> Distribution:
     )
 
 
-def _quantiles(distribution: Distribution, shares: Array, ends: tuple[float, float]) -> Array:
-    """(k,) values at shares (k,) of a distribution.
-
-    Shares of `ends` stand for 0 and 1 where the distribution has no end.
-    """
+def _values(distribution: Distribution, shares: Array) -> Array:
+    """(k,) values at shares (k,) of a distribution, from 0 up to less than 1."""
     if isinstance(distribution, tuple):
         low, high = distribution
         return np.asarray(low + shares * (high - low))
     if isinstance(distribution, np.ndarray):
         return np.asarray(distribution[np.minimum((shares * distribution.size).astype(int), distribution.size - 1)])
-    # a grid of shares goes to the ends, which some distributions do not have
-    inside = shares if np.isfinite(distribution.ppf([0.0, 1.0])).all() else np.clip(shares, *ends)
-    values = np.asarray(distribution.ppf(inside), dtype=float)
-    return np.clip(values, *distribution.support()) if hasattr(distribution, "support") else values
+    # a share of exactly 0 may be drawn, where an endless distribution is infinite and a discrete one below its least
+    return np.asarray(distribution.ppf(np.maximum(shares, FINEST_SHARE)), dtype=float)
+
+
+def _levels(name: str, distribution: Distribution, shares: Array) -> Array:
+    """(k,) values that divide the range of a distribution, from its 1 % to its 99 % quantile, as shares (k,) divide 1.
+
+    Steps that are equal in value, not in probability: only then does the change of a measure over a step, as SALib
+    scales it, say the same of every distribution.
+
+    Raises:
+        ParameterError: the distribution has single values, between which there are no equal steps.
+    """
+    if isinstance(distribution, np.ndarray) or hasattr(distribution, "pmf"):
+        raise ParameterError(
+            f"'{name}' has single values, which need not lie in equal steps, as method='morris' takes them. "
+            f"Give '{name}' a range, (low, high), or a continuous distribution, or take method='sobol'."
+        )
+    low, high = _values(distribution, np.array(RANGE))
+    return np.asarray(low + shares * (high - low))
 
 
 class Design:
@@ -86,11 +103,11 @@ class Design:
     Args:
         distributions: by parameter, as of `distributions_in_si`.
         method: one of `METHODS`.
-        samples: independent ones; of "sobol" with so many more for each parameter, of "morris" trajectories.
+        samples: independent ones; of "sobol" points with so many more for each parameter, of "morris" trajectories.
         seed: of the random numbers.
 
     Raises:
-        ParameterError: an argument is out of its range.
+        ParameterError: an argument is out of its range, or "morris" can take no steps in a distribution.
         MissingExtraError: SALib is not installed, which "sobol" and "morris" need.
     """
 
@@ -99,12 +116,12 @@ class Design:
             raise ParameterError(f"There is no method {method!r}. Take one of: {', '.join(METHODS)}.")
         if whole(samples) is None or samples < 2:
             raise ParameterError(f"samples = {samples!r} must be a whole number, 2 or more.")
-        self.names, self.method, self.count, self.seed = tuple(distributions), method, int(samples), seed
+        self.names, self.method, self.count, self.seed = tuple(distributions), method, int(samples), seed_number(seed)
         if method == "sobol" and self.count & (self.count - 1):
             raise ParameterError(f"samples = {samples} must be a power of two for Sobol' indices, such as 1024.")
         shares = self._shares()
         self.columns = {
-            name: _quantiles(distribution, column, (0.01, 0.99) if method == "morris" else (0.0, 1.0))
+            name: _levels(name, distribution, column) if method == "morris" else _values(distribution, column)
             for (name, distribution), column in zip(distributions.items(), shares.T, strict=True)
         }
         """(rows,) values by parameter."""
@@ -112,11 +129,11 @@ class Design:
 
     @property
     def problem(self) -> dict[str, Any]:
-        """As SALib wants it, in shares of the distributions."""
+        """As SALib wants it, in shares of the distributions, of "morris" in shares of their ranges."""
         return {"num_vars": len(self.names), "names": list(self.names), "bounds": [[0.0, 1.0]] * len(self.names)}
 
     def _shares(self) -> Array:
-        """(rows, parameters) shares of the distributions."""
+        """(rows, parameters) shares of the distributions, of "morris" of their ranges."""
         if self.method == "random":
             return np.random.default_rng(self.seed).random((self.count, len(self.names)))
         sampler = imported(f"SALib.sample.{self.method}", "uncertainty", f"uncertainty(method='{self.method}')")
@@ -125,8 +142,8 @@ class Design:
         return np.asarray(sampler.sample(self.problem, self.count, seed=1 + self.seed, **options))
 
     @property
-    def independent(self) -> NDArray[np.intp]:
-        """The rows that are independent samples; none of "morris"."""
+    def of_distribution(self) -> NDArray[np.intp]:
+        """The rows that are spread as the distributions are: of "sobol" Sobol' points; of "morris" none."""
         size = len(self.names) + 2  # of Saltelli's scheme: one sample, one change of each parameter, another sample
         if self.method == "sobol":
             return np.sort(
@@ -135,7 +152,7 @@ class Design:
         return np.arange(self.count if self.method == "random" else 0)
 
     def indices(self, values: Array, level: float) -> dict[str, tuple[Array, Array]]:
-        """SALib's analysis of a measure (rows,): each index with half of its interval."""
+        """SALib's analysis of a measure (rows,): each index with half of its interval, NaN where it has none."""
         analysis = imported(f"SALib.analyze.{self.method}", "uncertainty", "Uncertainty.indices()")
         if self.method == "sobol":
             results = analysis.analyze(
@@ -146,5 +163,5 @@ class Design:
         size, spread = np.asarray(results["mu_star"], dtype=float), np.asarray(results["sigma"], dtype=float)
         return {
             "mu*": (size, np.asarray(results["mu_star_conf"], dtype=float)),
-            "sigma": (spread, np.zeros_like(spread)),
+            "sigma": (spread, np.full_like(spread, np.nan)),
         }

@@ -33,9 +33,11 @@ def uncertainty(
 
     Law: "random" draws independent samples. "sobol" estimates by Saltelli's scheme which share of the variance comes
     from each parameter: S1 by itself, ST with all that it does together with others. "morris" screens many parameters
-    at little cost: mu* is the mean size of the change over the whole range of a parameter (of an endless one from 1 %
-    to 99 % of the distribution), sigma its spread, which is large where a parameter acts together with others.
-    Parameters are independent of each other.
+    at little cost. The range of each, from the 1 % to the 99 % quantile of its distribution, is divided into three
+    equal steps, and effects are changes over two of them, times 1.5: mu* is the mean size of the change over the whole
+    range, sigma its spread, which is large where a parameter acts together with others, or not in proportion. Single
+    values have no equal steps, so that "morris" takes no lists and no discrete distributions. Parameters are taken as
+    independent of each other.
 
     Args:
         net: the network; or a function from columns of samples by parameter to columns of results by measure.
@@ -50,7 +52,7 @@ def uncertainty(
         **options: of `sweep`: t_end, rtol, engine, initial, processes, store and so on.
 
     Raises:
-        ParameterError: an argument is out of its range, or a sample is not admissible.
+        ParameterError: an argument is out of its range, a sample is not admissible, or "morris" is given single values.
         MissingExtraError: SALib is not installed.
     """
     if not 0.0 < level < 1.0:

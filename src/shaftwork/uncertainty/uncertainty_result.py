@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy import stats
 
-from shaftwork.core.errors import ParameterError
+from shaftwork.core.errors import AccuracyWarning, ParameterError
 from shaftwork.core.notebook import html_table
+from shaftwork.core.notices import warn
 from shaftwork.core.parameters import in_si
 from shaftwork.core.screen import counted, in_columns
 from shaftwork.pipeline.measured_units import limits_in_si
@@ -27,7 +28,7 @@ class Probability(NamedTuple):
     """An estimated probability.
 
     Args:
-        value: share of the samples.
+        value: share of the samples that did not fail.
         low: of its confidence interval.
         high: of it.
     """
@@ -60,15 +61,19 @@ class Uncertainty:
         return tuple(self.sweep.measures)
 
     def values(self, measure: str) -> Array:
-        """(k,) a measure of the independent samples that did not fail.
+        """(k,) a measure of the samples of the distribution that did not fail; of those of "sobol" two of each set.
 
         Raises:
             ParameterError: there is no such measure, or the samples of "morris" tell no distribution.
         """
-        rows = self.design.independent
-        if not rows.size:
+        values = self._drawn(measure)
+        return values[np.isfinite(values)]
+
+    def _drawn(self, measure: str) -> Array:
+        """(k,) a measure of the samples of the distribution, not finite where it is not known."""
+        if not self.design.of_distribution.size:
             raise ParameterError("Samples of 'morris' tell no distribution. Take method='random' or 'sobol'.")
-        return self._column(measure)[rows[~self.sweep.failed[rows]]]
+        return self._column(measure)[self.design.of_distribution]
 
     def _column(self, measure: str) -> Array:
         if measure not in self.sweep.measures:
@@ -76,9 +81,13 @@ class Uncertainty:
         return self.sweep.measures[measure]
 
     def mean(self, measure: str) -> tuple[float, float]:
-        """The mean of a measure and the standard error of it."""
+        """The mean of a measure and the standard error of it; NaN for Sobol' points.
+
+        These fill the space evenly: the error is less than that of independent points, often by far, and their scatter
+        does not tell it.
+        """
         values = self.values(measure)
-        return float(values.mean()), float(stats.sem(values))
+        return float(values.mean()), float(stats.sem(values)) if self.design.method == "random" else np.nan
 
     def quantiles(self, measure: str, shares: tuple[float, ...] = (0.025, 0.5, 0.975)) -> Array:
         """The values that are not passed by certain shares of the samples."""
@@ -88,8 +97,8 @@ class Uncertainty:
         """How probable it is that a measure passes a limit.
 
         Law: the share of the samples that do, with the interval of Clopper and Pearson for independent ones; of Sobol'
-        points it is as a rule too wide. Nothing is known of samples that failed: the value and the upper end count them
-        as passing, the lower end as not.
+        points it is as a rule too wide. Nothing is known of samples that failed: the value leaves them out, the lower
+        end counts them as not passing, the upper end as passing.
 
         Args:
             measure: its name.
@@ -99,26 +108,34 @@ class Uncertainty:
         Raises:
             ParameterError: there is no such measure or no limit, or a limit is no finite number or has the wrong
                 unit.
+
+        Warns:
+            AccuracyWarning: some samples failed; says how many.
         """
         if above is None and below is None:
             raise ParameterError("Give a limit, above=... or below=....")
-        self.values(measure)
-        rows = self.design.independent
-        values, unit = self._column(measure)[rows], self.sweep.units.get(measure)
-        passing = np.zeros(rows.size, dtype=bool)
+        values, unit = self._drawn(measure), self.sweep.units.get(measure)
+        known = np.isfinite(values)
+        passing = np.zeros(values.size, dtype=bool)
         for name, limit, passed in (("above", above, np.greater), ("below", below, np.less)):
             if limit is not None:
-                passing |= passed(values, in_si(name, limits_in_si(name, limit, unit)))
-        most = int((passing | self.sweep.failed[rows]).sum())
-        low, high = (
-            stats.binomtest(count, rows.size).proportion_ci(self.level) for count in (int(passing.sum()), most)
-        )
-        return Probability(most / rows.size, float(low.low), float(high.high))
+                passing |= known & passed(values, in_si(name, limits_in_si(name, limit, unit)))
+        least, failed = int(passing.sum()), int((~known).sum())
+        if failed:
+            warn(
+                f"'{measure}' is not known of {counted(failed, 'sample')} of {values.size}, which failed: the "
+                "probability is that of the others, and its interval holds whether or not these pass the limit; see "
+                "sweep.reasons.",
+                AccuracyWarning,
+            )
+        low, high = (stats.binomtest(k, values.size).proportion_ci(self.level) for k in (least, least + failed))
+        share = least / (values.size - failed) if known.any() else np.nan
+        return Probability(share, float(low.low), float(high.high))
 
     def indices(self, measure: str) -> dict[str, dict[str, tuple[float, float]]]:
         """Where the uncertainty of a measure comes from: by index and parameter, the value and half its interval.
 
-        S1 and ST of "sobol", mu* and sigma of "morris", as `uncertainty` explains them.
+        S1 and ST of "sobol", mu* and sigma of "morris", as `uncertainty` explains them. Sigma has no interval: NaN.
 
         Raises:
             ParameterError: the samples are random ones, or some of them failed.
@@ -145,12 +162,14 @@ class Uncertainty:
 
     def _rows(self) -> list[list[str]]:
         """Cells of the table of distributions."""
-        if self.design.method == "morris" or self.sweep.failed.all():
+        shown = [] if self.design.method == "morris" else [name for name in self.measures if self.values(name).size > 1]
+        if not shown:
             return []
-        rows = [["", "mean", "+-", "deviation", "2.5 %", "50 %", "97.5 %"]]
-        for measure in self.measures:
+        errors = self.design.method == "random"
+        rows = [["", "mean", *(["std. error"] if errors else []), "deviation", "2.5 %", "50 %", "97.5 %"]]
+        for measure in shown:
             mean, error = self.mean(measure)
-            numbers = f"{mean:.6g}", f"{error:.2g}", f"{self.values(measure).std(ddof=1):.4g}"
+            numbers = f"{mean:.6g}", *([f"{error:.2g}"] if errors else []), f"{self.values(measure).std(ddof=1):.4g}"
             rows.append([measure, *numbers, *(f"{value:.6g}" for value in self.quantiles(measure))])
         return rows
 
@@ -162,9 +181,10 @@ class Uncertainty:
         for measure in self.measures:
             indices = self.indices(measure)
             leading = indices["ST"] if "ST" in indices else indices["mu*"]
-            rows.append([measure, *(text for index in indices for text in (index, "+-"))])
+            rows.append([measure, *(text for index in indices for text in (index, f"+- ({100 * self.level:g} %)"))])
             for name in sorted(leading, key=lambda name: -leading[name][0]):
-                rows.append([name, *(f"{value:z.3g}" for by in indices.values() for value in by[name])])
+                cells = (value for by in indices.values() for value in by[name])
+                rows.append([name, *("" if np.isnan(value) else f"{value:z.3g}" for value in cells)])
         return rows
 
     @property
@@ -186,11 +206,15 @@ class Uncertainty:
         """Histograms of the measures, and their indices where there are any (extra `plot`).
 
         Raises:
+            ParameterError: there is neither, as samples failed.
             MissingExtraError: matplotlib is not installed.
         """
-        has_values, has_indices = self.design.method != "morris", self.design.method != "random"
+        has_values, has_indices = bool(self._rows()), self.design.method != "random" and not self._unranked
         columns = has_values + has_indices
-        figure = new_figure("Uncertainty.plot()", 4.6 * columns, 0.6 + 2.8 * len(self.measures), self.sweep.name)
+        if not columns:
+            raise ParameterError(f"There is nothing to draw. {self._unranked or self._title}")
+        title = ": ".join(filter(None, [self.sweep.name, self._unranked]))
+        figure = new_figure("Uncertainty.plot()", 4.6 * columns, 0.6 + 2.8 * len(self.measures), title)
         grid = figure.subplots(len(self.measures), columns, squeeze=False)
         for measure, axes in zip(self.measures, grid, strict=True):
             if has_values:
