@@ -86,6 +86,9 @@ def test_the_crane_comes_back() -> None:
     assert abs(fit.correlation["shaft.tau"]) < 4 * t.size**-0.5
     assert not fit.by_differences
     assert not fit.unseen
+    for level in (95, 0.0, -1.0):
+        with pytest.raises(sw.ParameterError, match=rf"level = {level} must lie between 0 and 1"):
+            fit.intervals(level)
     assert fit.fitted.compile().parameters["shaft.c"] == fit.values["shaft.c"]
 
 

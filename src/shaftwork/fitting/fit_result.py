@@ -16,6 +16,7 @@ from shaftwork.fitting.curves import Scaling
 from shaftwork.fitting.estimation import Estimate
 from shaftwork.fitting.spreads import LOSSES, Data
 from shaftwork.numerics.tolerances import EQUAL
+from shaftwork.pipeline.arguments import inner_share
 from shaftwork.pipeline.network import Network, with_values
 from shaftwork.results.plotting import new_figure, plain
 
@@ -99,9 +100,12 @@ class Fit:
 
         Args:
             level: the share of records whose interval holds the true value.
+
+        Raises:
+            ParameterError: it does not lie between 0 and 1.
         """
         found = self.estimate
-        reach = found.reach(level)
+        reach = found.reach(inner_share("level", level))
         middle = np.where(self.scaling.to_zero | found.at_bounds, found.step, 0.0)
         low, high = (self.scaling.ends(found.unknowns, middle + sign * reach, found.bounds) for sign in (-1.0, 1.0))
         return dict(zip(self.scaling.names, zip(low.tolist(), high.tolist(), strict=True), strict=True))

@@ -142,6 +142,18 @@ def step_limit(max_steps: Any) -> int:
     return count
 
 
+def inner_share(name: str, value: Any) -> float:
+    """A level of confidence.
+
+    Raises:
+        ParameterError: it does not lie between 0 and 1.
+    """
+    share = in_si(name, value)
+    if not 0.0 < share < 1.0:
+        raise ParameterError(f"{name} = {value!r} must lie between 0 and 1.")
+    return share
+
+
 def seed_number(seed: Any) -> int:
     """A seed of random numbers.
 

@@ -48,6 +48,8 @@ class Store:
     """
 
     def __init__(self, path: str | Path, task: Task) -> None:
+        if not isinstance(path, str | Path):
+            raise ParameterError(f"store = {path!r} must be the name of a file.")
         self._path = Path(path)
         if self._path.exists() and not self._path.is_file():
             raise ParameterError(f"store = '{path}' cannot be used: it is no file. Give another name.")

@@ -14,7 +14,7 @@ from shaftwork.codegen.model_observer import ModelObserver
 from shaftwork.core.errors import AccuracyWarning, NetworkWarning, ParameterError, SimulationError, no_quantity
 from shaftwork.core.notices import muted, warn
 from shaftwork.core.screen import counted
-from shaftwork.pipeline.arguments import seed_number
+from shaftwork.pipeline.arguments import inner_share, seed_number
 from shaftwork.pipeline.network import Network, network_of
 from shaftwork.results.observer import Array, array_in_si
 from shaftwork.results.plotting import new_figure, plain
@@ -123,8 +123,7 @@ def bands(
     units, times = _units(net, quantity), array_in_si("t", t, "s")
     if not (times.size and np.isfinite(times).all() and (np.diff(times) > 0.0).all()):
         raise ParameterError("t must be times in s that ascend, such as np.linspace(0.0, 1.0, 101).")
-    if not 0.0 < level < 1.0:
-        raise ParameterError(f"level = {level!r} must lie between 0 and 1.")
+    level = inner_share("level", level)
     columns = _columns(distributions_in_si(net, distributions), samples, seed_number(seed))
     if len(next(iter(columns.values()))) < 2:
         raise ParameterError("A band needs two samples or more.")

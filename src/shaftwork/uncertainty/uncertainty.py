@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from shaftwork.core.errors import ParameterError
+from shaftwork.pipeline.arguments import inner_share
 from shaftwork.pipeline.network import Network
 from shaftwork.results.observer import Array
 from shaftwork.sweep.sweep import Measures, sweep
@@ -55,8 +56,7 @@ def uncertainty(
         ParameterError: an argument is out of its range, a sample is not admissible, or "morris" is given single values.
         MissingExtraError: SALib is not installed.
     """
-    if not 0.0 < level < 1.0:
-        raise ParameterError(f"level = {level!r} must lie between 0 and 1.")
+    level = inner_share("level", level)
     known = distributions_in_si(net if isinstance(net, Network) else None, distributions)
     design = Design(known, method, samples, seed)
     if isinstance(net, Network):

@@ -14,6 +14,7 @@ from shaftwork.core.notebook import html_table
 from shaftwork.core.notices import warn
 from shaftwork.core.parameters import in_si
 from shaftwork.core.screen import counted, in_columns
+from shaftwork.pipeline.arguments import inner_share
 from shaftwork.pipeline.measured_units import limits_in_si
 from shaftwork.results.observer import Array
 from shaftwork.results.plotting import new_figure, plain
@@ -90,8 +91,12 @@ class Uncertainty:
         return float(values.mean()), float(stats.sem(values)) if self.design.method == "random" else np.nan
 
     def quantiles(self, measure: str, shares: tuple[float, ...] = (0.025, 0.5, 0.975)) -> Array:
-        """The values that are not passed by certain shares of the samples."""
-        return np.asarray(np.quantile(self.values(measure), shares))
+        """The values that are not passed by certain shares of the samples.
+
+        Raises:
+            ParameterError: there is no such measure, or a share does not lie between 0 and 1.
+        """
+        return np.asarray(np.quantile(self.values(measure), [inner_share("a share", share) for share in shares]))
 
     def probability(self, measure: str, *, above: float | None = None, below: float | None = None) -> Probability:
         """How probable it is that a measure passes a limit.
