@@ -14,7 +14,7 @@ from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import AccuracyWarning, ParameterError
 from shaftwork.core.notices import warn
-from shaftwork.core.parameters import Parameter, in_si, whole
+from shaftwork.core.parameters import Parameter, in_si
 from shaftwork.fitting.curves import (
     RecordedMotion,
     RecordedResponse,
@@ -29,7 +29,15 @@ from shaftwork.fitting.fit_result import AT_START, Fit
 from shaftwork.fitting.fitted_records import RecordedSeries, read_records
 from shaftwork.fitting.several_starts import estimates, starts_from
 from shaftwork.network.netlist import Netlist
-from shaftwork.pipeline.arguments import checked_parameter, checked_parameters, range_of, relative_tolerance, repeated
+from shaftwork.pipeline.arguments import (
+    checked_parameter,
+    checked_parameters,
+    range_of,
+    relative_tolerance,
+    repeated,
+    seed_number,
+    start_count,
+)
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import refuse_motion
 from shaftwork.pipeline.network import Network, network_of
@@ -98,8 +106,7 @@ def fit(
     Warns:
         AccuracyWarning: what is left is plainly no noise, so that the intervals do not hold.
     """
-    if whole(starts) is None or whole(seed, 0) is None:
-        raise ParameterError(f"starts = {starts!r} must be a whole number, 1 or more, and seed = {seed!r} 0 or more.")
+    starts, seed = start_count(starts), seed_number(seed)
     domain, records = read_records(record)
     initials, others, points = (
         _of_each(name, given, len(records))

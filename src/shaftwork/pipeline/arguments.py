@@ -142,6 +142,30 @@ def step_limit(max_steps: Any) -> int:
     return count
 
 
+def start_count(starts: Any) -> int:
+    """From how many places a search starts.
+
+    Raises:
+        ParameterError: it is no count.
+    """
+    count = whole(starts)
+    if count is None:
+        raise ParameterError(f"starts = {starts!r} must be a whole number, 1 or more.")
+    return count
+
+
+def seed_number(seed: Any) -> int:
+    """The seed of what is drawn.
+
+    Raises:
+        ParameterError: it is none.
+    """
+    number = whole(seed, 0)
+    if number is None:
+        raise ParameterError(f"seed = {seed!r} must be a whole number, 0 or more.")
+    return number
+
+
 def absolute_tolerances(atol: Any, size: int) -> Array:
     """(states,) absolute tolerances.
 
