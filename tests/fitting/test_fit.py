@@ -156,6 +156,23 @@ def test_a_parameter_that_is_zero_in_the_network_is_fitted_from_its_start() -> N
         sw.fit(net, record, "shaft.d", initial=initial)
 
 
+def test_a_switch_at_the_end_of_the_record_by_the_network_alone_can_be_fitted() -> None:
+    """What counts is where the motion switches whose derivatives are taken: at the start of the fit, 0.3 s."""
+
+    def pulled(t_off: float) -> sw.Network:
+        net = sw.Network("pulled")
+        net.add(sw.KlossMotor("motor", tau_k=5.0, s_k=0.3, n_sync=1500.0, t_on=0.1, t_off=t_off), "a")
+        net.add(sw.Inertia("J", J=1.0), "a")
+        return net
+
+    t = np.linspace(0.0, 0.5, 51)
+    record = {"t": t, "J.omega": pulled(0.35).simulate(0.5, t_eval=t, rtol=1e-10)["J.omega"]}
+    fit = sw.fit(pulled(0.5), record, "motor.t_off", start={"motor.t_off": 0.3})
+    assert fit.values["motor.t_off"] == pytest.approx(0.35, rel=1e-6)  # motions to 1e-8
+    with pytest.raises(sw.ParameterError, match="exactly at the start or at the end"):
+        sw.fit(pulled(0.3), record, "motor.t_off", start={"motor.t_off": 0.5})
+
+
 def test_records_with_loads_and_start_values_of_their_own_are_fitted_together() -> None:
     net, rng = sw.scenes.crane_start(), np.random.default_rng(6)
     model, t = net.compile(), np.linspace(0.0, 4.0, 201)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -98,6 +99,121 @@ def test_a_motion_through_phases_is_no_worse_than_a_grid() -> None:
     assert best.best.goals["max shaft.tau"] <= grid.measures["max shaft.tau"].min() * (1 + 1e-6)
 
 
+@pytest.mark.parametrize("limits", [(None, np.inf), (-np.inf, None), (-np.inf, np.inf)])
+def test_an_infinite_limit_is_none(limits: tuple[float | None, float | None]) -> None:
+    require, span = {"max JM.omega": limits}, {"gear.ratio": (2.0, 60.0)}
+    best = sw.optimize(axis(), span, "end JL.omega", t_end=1.0, maximize=True, require=require)
+    assert best.best.goals["end JL.omega"] == pytest.approx(5.0, rel=1e-8)
+    assert best.require == {"max JM.omega": (None, None)}
+
+
+@pytest.mark.parametrize("steady", [False, True])
+def test_differences_are_as_small_as_the_range_of_a_variable(*, steady: bool) -> None:
+    net = axis()
+    net.add(sw.TorqueSource("brake", tau=-1.0), "drum")  # moved into the range, it starts from 0
+    best = sw.optimize(
+        net,
+        {"brake.tau": (0.0, 1e-7)},
+        lambda values: 1.0 + (values["brake.tau"] / 1e-7 - 0.3) ** 2,
+        t_end=0.1,
+        steady=steady,
+    )
+    # a step of 1e-8 of the range moves the bottom of the parabola by half of that, and it is flat there
+    assert best.values["brake.tau"] == pytest.approx(3e-8, rel=1e-4)
+
+
+STEEP: dict[str, tuple[Callable[[float], float], float]] = {
+    "exponential": (lambda r: np.cosh(2 * (r - 20)), 20.0),  # 5e12 at the start, r = 5
+    "quartic": (lambda r: (r - 20) ** 4, 20.0),
+    "zero at the start": (lambda r: (r - 20) ** 2 - 225 + 1e-4, 20.0),
+}
+
+
+@pytest.mark.parametrize("name", STEEP)
+def test_the_size_of_the_goal_at_the_start_does_not_decide_where_a_descent_ends(name: str) -> None:
+    goal, expected = STEEP[name]
+    best = sw.optimize(axis(), {"gear.ratio": (2.0, 60.0)}, lambda v: float(goal(v["gear.ratio"])), t_end=1.0)
+    assert best.best.success
+    assert best.values["gear.ratio"] == pytest.approx(expected, rel=1e-4)  # flat there: half of the digits
+
+
+def test_a_goal_that_still_falls_after_all_new_starts_has_no_minimum_yet() -> None:
+    def goal(values: Mapping[str, float]) -> float:
+        return float(np.exp((values["gear.ratio"] - 20) ** 2))  # 1e97 at the start
+
+    best = sw.optimize(axis(), {"gear.ratio": (2.0, 40.0)}, goal, t_end=1.0)
+    assert not best.best.success
+    assert "given up after 4 new starts" in str(best)
+
+
+def _within(goal: Callable[[float], float], level: Callable[[float], float], least: float) -> sw.Optimum:
+    return sw.optimize(
+        axis(),
+        {"gear.ratio": (2.0, 60.0)},
+        lambda values: float(goal(values["gear.ratio"])),
+        t_end=1.0,
+        functions={"level": lambda values: float(level(values["gear.ratio"]))},
+        require={"level": (least, None)},
+    )
+
+
+def test_a_descent_that_fails_gives_the_best_design_that_it_has_met() -> None:
+    """SLSQP runs to the end of the range at 60, where the level is below its limit, and fails; the start is within."""
+    made = _within(
+        lambda r: 0.157 * np.sin(0.307 * r + 0.05) - 0.0306 * r,
+        lambda r: 0.047 * np.cos(0.053 * r - 0.82) + 0.964 * np.sin(0.106 * r),
+        0.273,
+    )
+    assert not made.best.success
+    assert made.best.goals["level"] >= 0.273
+    assert "no minimum yet" in str(made)
+
+
+def test_a_better_design_on_the_way_is_not_left_behind() -> None:
+    """SLSQP looks at a deeper valley, goes back and ends at 36.4, where the goal is -1.59."""
+    tried: list[tuple[float, float]] = []
+
+    def goal(r: float) -> float:
+        value = 0.629 * np.sin(0.318 * r + 0.825) - 0.041 * r
+        tried.append((level(r), value))
+        return value
+
+    def level(r: float) -> float:
+        return 0.55 * np.cos(0.21 * r - 0.606) - 0.41 * np.sin(0.42 * r)
+
+    best = _within(goal, level, 0.236).best
+    assert best.success
+    assert best.goals["objective"] <= min(value for at, value in tried if at >= 0.236) + 1e-6
+
+
+def test_whether_a_descent_succeeded_is_not_read_from_its_message() -> None:
+    made = sw.optimize(axis(), {"gear.ratio": (2.0, 60.0)}, "end JL.omega", t_end=1.0, maximize=True)
+    failed = replace(made, attempts=(replace(made.best, success=False, message="without success"),))
+    assert made.best.success
+    assert "no minimum yet" not in str(made)
+    assert "no minimum yet" in str(failed)
+
+
+@pytest.mark.slow
+def test_a_descent_takes_few_motions_where_the_goal_is_smooth_and_some_hundred_where_peaks_are_alike() -> None:
+    net = sw.scenes.six_phases()
+    names = ("shaft.c", "shaft.d", "J1.J", "J2.J", "brake.tau", "shaft.gap")
+    ranges = {name: (0.5 * value, 2 * value) for name in names for value in [net.compile().parameters[name]]}
+    smooth = sw.optimize(net, ranges, "max shaft.tau", t_end=3.0)
+    assert smooth.best.motions <= 20  # 8
+
+    net = sw.Network("absorber")
+    net.add(sw.TorqueSource("step", tau=5.0), "a")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    net.add(sw.Spring("s", c=100.0, d=0.5), "a", "ground")
+    net.add(sw.Spring("k", c=10.0, d=1.0), "a", "b")
+    net.add(sw.Inertia("A", J=0.1), "b")
+    three = {"k.c": (1.0, 200.0), "k.d": (0.1, 10.0), "A.J": (0.01, 0.5)}
+    kinked = sw.optimize(net, three, "max s.tau", t_end=10.0)
+    assert 20 < kinked.best.motions <= 200  # 98
+    assert kinked.best.success
+
+
 def test_where_no_design_meets_the_limits_the_error_says_how_near_they_came() -> None:
     made = sw.optimize(
         axis(), {"gear.ratio": (2.0, 60.0)}, "max JM.omega", t_end=1.0, require={"end JL.omega": (9.0, None)}
@@ -190,6 +306,10 @@ def test_nothing_is_asked_outside_the_ranges() -> None:
         ({"goal": "JL.omega"}, "is no measure"),
         ({"goal": "damage JL.omega"}, "no derivative"),
         ({"starts": 0}, "starts = 0"),
+        ({"seed": -1}, "seed = -1 must be a whole number, 0 or more"),
+        ({"seed": 1.5}, r"seed = 1\.5 must be a whole number"),
+        ({"require": {"end JL.omega": (np.inf, None)}}, "no value is at least inf"),
+        ({"require": {"end JL.omega": (None, np.nan)}}, "no value is at least None and at most nan"),
         ({"require": {"end JL.omega": 3.0}}, "must be .low, high."),
         ({"require": {"end JL.omega": ("a", None)}}, r"is a text"),
         ({"functions": {"size": len}}, "a function without limits"),

@@ -14,7 +14,7 @@ from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import AccuracyWarning, ParameterError
 from shaftwork.core.notices import warn
-from shaftwork.core.parameters import Parameter, in_si, whole
+from shaftwork.core.parameters import Parameter, in_si
 from shaftwork.fitting.curves import (
     RecordedMotion,
     RecordedResponse,
@@ -38,6 +38,7 @@ from shaftwork.pipeline.arguments import (
     relative_tolerance,
     repeated,
     seed_number,
+    start_count,
 )
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import refuse_motion
@@ -109,9 +110,7 @@ def fit(
     Warns:
         AccuracyWarning: what is left is no white noise, or more than `sigma`, so that the intervals do not hold.
     """
-    seed = seed_number(seed)
-    if whole(starts) is None:
-        raise ParameterError(f"starts = {starts!r} must be a whole number, 1 or more.")
+    starts, seed = start_count(starts), seed_number(seed)
     domain, records = read_records(record)
     initials, others, points = (
         _of_each(name, given, len(records))

@@ -59,9 +59,10 @@ class MeasuredMotion:
             else ParametricMotion(self._model, quantities, self._integrands, self._names, (0.0, t_end), initial, rtol)
         )
         self._fixed = self._model.parameters
-        self._last: tuple[bytes, dict[str, tuple[float, Array]]] = b"", {}
-        self._failure = ""
-        """Why there is no motion for the last variables; empty where there is."""
+        self._known = dict[bytes, dict[str, tuple[float, Array]]]()
+        """What was computed so far, by variables: a descent comes back to its best design."""
+        self._failures = dict[bytes, str]()
+        """Why there is no motion, by variables."""
         self.motions = 0
         """How many were computed."""
 
@@ -71,26 +72,25 @@ class MeasuredMotion:
 
     def at(self, variables: Array) -> dict[str, tuple[float, Array]]:
         """Each goal with its gradient (m,); NaN where there is no motion."""
-        if self._last[0] != (key := variables.tobytes()):
-            self._last = key, self._computed(variables)
-        return self._last[1]
+        if (key := variables.tobytes()) not in self._known:
+            self._known[key] = self._computed(variables)
+        return self._known[key]
 
     def undefined(self, variables: Array) -> str:
         """Which goal has no finite value and why; empty where all have one."""
         goals = {name: value for name, (value, _) in self.at(variables).items() if not np.isfinite(value)}
-        if goals and self._failure:
-            return f"there is no motion ({self._failure})"
+        if goals and (failure := self._failures.get(variables.tobytes())):
+            return f"there is no motion ({failure})"
         return next((f"{name} is {value:g}" for name, value in goals.items()), "")
 
     def _computed(self, variables: Array) -> dict[str, tuple[float, Array]]:
         values, results = self.values(variables), dict[str, tuple[float, Array]]()
-        self._failure = ""
         if self._read:
             self.motions += 1
             try:
                 results = self._measures(values)
             except (SimulationError, NetworkError) as error:
-                self._failure = in_one_line(error).rstrip(".")
+                self._failures[variables.tobytes()] = in_one_line(error).rstrip(".")
                 results = {name: (np.nan, np.zeros(variables.size)) for name in self._read}
         for name, goal in self._goals.items():
             if not isinstance(goal, str):
@@ -124,7 +124,7 @@ class MeasuredMotion:
             return all_of(self._from_steady(near) if self._motion is None else self._motion.motion(near).solution)
 
         at = np.array(list(values.values()))
-        steps = 1e-4 * np.where(at == 0.0, 1.0, np.abs(at))  # measures are known to some 1e-9
+        steps = self._steps(at, 1e-4)  # measures are known to some 1e-9
         slopes = differences(beside, at, steps, self._low, self._high)
         return dict(zip(self._read, zip(all_of(solution).tolist(), slopes, strict=True), strict=True))
 
@@ -154,5 +154,12 @@ class MeasuredMotion:
 
         if not np.isfinite(here := value(variables)):
             return here, np.zeros(variables.size)
-        steps = 1e-6 * np.where(variables == 0.0, 1.0, np.abs(variables))
-        return here, differences(finite, variables, steps, self._low, self._high)[0]
+        return here, differences(finite, variables, self._steps(variables, 1e-6), self._low, self._high)[0]
+
+    def _steps(self, at: Array, share: float) -> Array:
+        """(m,) steps of differences: a share of the variable, where it is near zero or far from it of its range.
+
+        Ranges may have decades, so a variable in the lowest hundredth of its range steps less than one at the top.
+        """
+        width = self._high - self._low
+        return share * np.clip(np.abs(at), 0.01 * width, width)

@@ -11,13 +11,19 @@ import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.parameters import whole
 from shaftwork.core.screen import progress
 from shaftwork.numerics.even_points import even_points
-from shaftwork.optimization.descent import Descent
+from shaftwork.optimization.descent import Descent, End
 from shaftwork.optimization.measured_motion import Goal, MeasuredMotion
 from shaftwork.optimization.optimum import Attempt, Optimum
-from shaftwork.pipeline.arguments import checked_parameter, range_of, relative_tolerance, time_span
+from shaftwork.pipeline.arguments import (
+    checked_parameter,
+    range_of,
+    relative_tolerance,
+    seed_number,
+    start_count,
+    time_span,
+)
 from shaftwork.pipeline.measured_units import units_of
 from shaftwork.pipeline.motion_start import refuse_motion
 from shaftwork.pipeline.network import Network, network_of, with_values
@@ -72,8 +78,7 @@ def optimize(
         SimulationError: there is no motion at a start.
     """
     ranges = _ranges(net, variables)
-    if whole(starts) is None:
-        raise ParameterError(f"starts = {starts!r} must be a whole number, 1 or more.")
+    starts, seed = start_count(starts), seed_number(seed)
     if OBJECTIVE in (functions or {}):
         raise ParameterError(f"'{OBJECTIVE}' is the name of the goal. Give the function another one.")
     refuse_motion(initial, "optimize")
@@ -162,7 +167,7 @@ def _attempt(
     descent: Descent,
 ) -> Attempt:
     before = motion.motions
-    variables, message = (start, "") if motion.undefined(start) else descent.run(start)
-    goals = {of: value for of, (value, _) in motion.at(variables).items()}
-    message = motion.undefined(variables) or message
-    return Attempt(choice, {**fixed, **motion.values(variables)}, goals, message, motion.motions - before)
+    end = End(start, "", success=False) if motion.undefined(start) else descent.run(start)
+    goals = {of: value for of, (value, _) in motion.at(end.variables).items()}
+    message, values = motion.undefined(end.variables) or end.message, {**fixed, **motion.values(end.variables)}
+    return Attempt(choice, values, goals, message, end.success, motion.motions - before)

@@ -26,6 +26,7 @@ class Attempt:
         values: of variables and of what was chosen, in SI.
         goals: by name.
         message: why it ended; of one without a finite value of every goal which has none.
+        success: whether it ended where the goal is least nearby.
         motions: computed for it.
     """
 
@@ -33,6 +34,7 @@ class Attempt:
     values: Mapping[str, float]
     goals: Mapping[str, float]
     message: str
+    success: bool
     motions: int
 
     @property
@@ -112,7 +114,7 @@ class Optimum:
         rows = [[name, f"{value:.6g}", ""] for name, value in best.values.items()]
         rows += [[name, f"{value:.6g}", self._said(name)] for name, value in best.goals.items()]
         rows += [[name, f"number {number}", "chosen"] for name, number in best.choice.items()]
-        rows += [] if "success" in best.message else [["no minimum yet", "", best.message]]
+        rows += [] if best.success else [["no minimum yet", "", best.message]]
         return title, ["", "best", ""], rows
 
     def _said(self, name: str) -> str:
@@ -136,7 +138,7 @@ def missed(require: Mapping[str, Limits], goals: Mapping[str, float]) -> dict[st
     misses = dict[str, float]()
     for name, (low, high) in require.items():
         beyond = max(0.0 if low is None else low - goals[name], 0.0 if high is None else goals[name] - high)
-        size = max((abs(end) for end in (low, high) if end is not None and np.isfinite(end)), default=0.0)
+        size = max((abs(end) for end in (low, high) if end is not None), default=0.0)
         if beyond > EQUAL * size:
             misses[name] = beyond / (size or 1.0)
     return dict(sorted(misses.items(), key=itemgetter(1), reverse=True))

@@ -154,6 +154,18 @@ def inner_share(name: str, value: Any) -> float:
     return share
 
 
+def start_count(starts: Any) -> int:
+    """From how many places a search starts.
+
+    Raises:
+        ParameterError: it is no count.
+    """
+    count = whole(starts)
+    if count is None:
+        raise ParameterError(f"starts = {starts!r} must be a whole number, 1 or more.")
+    return count
+
+
 def seed_number(seed: Any) -> int:
     """A seed of random numbers.
 

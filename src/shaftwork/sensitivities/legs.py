@@ -141,10 +141,10 @@ class DifferentiatedMotion:
     values: Mapping[str, float] = field(default_factory=dict)
 
     @property
-    def models(self) -> tuple[Model, ...]:
-        """All equations that hold on the way."""
+    def used(self) -> dict[Model, Array]:
+        """All equations that hold on the way, with their parameters (p,)."""
         legs = self.legs if self.start is None else (self.start, *self.legs)
-        return tuple(dict.fromkeys(leg.model for leg in legs))
+        return {leg.model: leg.p for leg in legs}
 
 
 def motion_of(

@@ -18,10 +18,10 @@ from shaftwork.formulation.observables import Observables
 from shaftwork.numerics.tolerances import SAME, TYPED
 from shaftwork.numerics.zeros import zero
 from shaftwork.pipeline.model import Model
-from shaftwork.sensitivities.carrying import End, SensitivityTransfer
 from shaftwork.sensitivities.differentiation import Differentiated, ValueWithSlopes, rows_of
+from shaftwork.sensitivities.jump_conditions import ADVICE, Jump, JumpConditions, by_chance
 from shaftwork.sensitivities.legs import DifferentiatedMotion, Leg, parted
-from shaftwork.sensitivities.saltation import ADVICE, Jump, JumpConditions, by_chance
+from shaftwork.sensitivities.sensitivity_transfer import End, SensitivityTransfer
 from shaftwork.sensitivities.variation import Coefficients, Variation, variation
 
 if TYPE_CHECKING:
@@ -117,17 +117,17 @@ class MotionSlopes:
     def _integrate(self) -> None:
         motion, count = self._motion, self.parameters.size
         sets = motion.equation_sets
-        carrying = None if sets is None else SensitivityTransfer(sets, motion.values, self.equations, self.sizes)
+        transfer = None if sets is None else SensitivityTransfer(sets, motion.values, self.equations, self.sizes)
         length, fixed = self.legs[-1].end - self.legs[0].start, np.zeros(count)
-        jumps = JumpConditions(self.equations, carrying, self.sizes, self._swiftest.__getitem__, length)
+        jumps = JumpConditions(self.equations, transfer, self.sizes, self._swiftest.__getitem__, length)
         leg = self.legs[0]
         size, slopes = len(leg.model.states), np.zeros((self._swiftest[leg.model].size, count))
-        if carrying is None or motion.start is None:
+        if transfer is None or motion.start is None:
             slopes[:size] = self._first
         else:
             loose = motion.start
             end = End(loose.at(loose.high)[1], leg.at(leg.low)[1], self._first, fixed)
-            slopes[:size] = carrying.over(loose, leg, [end], self._transitions(leg))[1]
+            slopes[:size] = transfer.over(loose, leg, [end], self._transitions(leg))[1]
         self._shifts.append(fixed)
         doubts: list[tuple[float, float]] = []
         last: Jump | None = None

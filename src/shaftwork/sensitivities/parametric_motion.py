@@ -65,10 +65,11 @@ class ParametricMotion:
                 f"states: {', '.join(sorted(states))}."
             )
         rows_of(self.model)
-        smooth_parameters(self.model, parameters, (self.model,), span)  # said before the motion is made
+        used = [(self.model, self.model.vector(values))]
+        smooth_parameters(self.model, parameters, used, span)  # said before the motion is made
         self.nominal = self.motion(values or {})
         """The motion for these values."""
-        names = smooth_parameters(self.model, parameters, self.nominal.models, span)
+        names = smooth_parameters(self.model, parameters, self.nominal.used.items(), span)
         names = without_start(self.model, names, self._initial, span, are_asked=parameters is not None)
         self.parameters = {
             **{name: (values or {}).get(name, self.model.parameters[name]) for name in names},

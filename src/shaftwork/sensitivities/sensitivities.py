@@ -49,7 +49,7 @@ def frequency_sensitivities(
     model = network_of(net).compile()
     refuse_sampled(model.form, "it has no frequencies")
     equations, p, time, x, _ = model.point({}, at, t)
-    names = smooth_parameters(model, _listed(parameters), (model, equations))
+    names = smooth_parameters(model, _listed(parameters), ((model, model.defaults), (equations, p)))
     rows = rows_of(equations)
     jacobian = SlopeMatrix(rows, rows.rates, rows.states)
     matrix = jacobian(time, x, p)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -32,14 +32,17 @@ NO_DERIVATIVE = {
 
 
 def smooth_parameters(
-    model: Model, names: Sequence[str] | None, used: Sequence[CompiledModel], span: tuple[float, float] | None = None
+    model: Model,
+    names: Sequence[str] | None,
+    used: Iterable[tuple[CompiledModel, Array]],
+    span: tuple[float, float] | None = None,
 ) -> tuple[str, ...]:
     """The parameters by which to differentiate.
 
     Args:
         model: the compiled network.
         names: of parameters; None for all in which the equations are smooth.
-        used: models of all equations that hold on the way.
+        used: models of all equations that hold on the way, with their parameters (p,).
         span: start and end of the motion, s; None where there is none.
 
     Raises:
@@ -52,11 +55,11 @@ def smooth_parameters(
     }
     numbers = [name for name in model.parameters if name in declared]
     reasons = {name: "whole" for name in numbers if declared[name].whole}
-    for one in used:
+    for one, p in used:
         reasons |= dict.fromkeys((*one.form.graph.zeros, *one.form.tree.frozen), "decisive")
         reasons |= dict.fromkeys(_seeds(one), "seed")
         if span is not None:
-            reasons |= dict.fromkeys(_at_edges(one, span), "edge")
+            reasons |= dict.fromkeys(_at_edges(one, p, span), "edge")
     if names is None:
         return tuple(name for name in numbers if name not in reasons)
     for name in names:
@@ -75,9 +78,9 @@ def _seeds(model: CompiledModel) -> Iterator[str]:
             yield from (symbol.name for symbol in noise.args[1].free_symbols)
 
 
-def _at_edges(model: CompiledModel, span: tuple[float, float]) -> Iterator[str]:
+def _at_edges(model: CompiledModel, p: Array, span: tuple[float, float]) -> Iterator[str]:
     """Parameters that move a switch of a law of time, or of a mode, which is at the start or at the end of a motion."""
-    switching, p = model.switching, model.defaults
+    switching = model.switching
     instants = switching.timeline(p, *span)
     after, before = instants.sides(span[0])[1], instants.sides(span[1])[0]
     values = dict(zip((Symbol(name, real=True) for name in model.form.graph.parameters), p.tolist(), strict=True))

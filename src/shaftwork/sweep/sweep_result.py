@@ -36,7 +36,7 @@ def limits_of(require: Mapping[str, Any], unit_of: Callable[[str], str | None]) 
     """Limits that a user gave, by name, in SI.
 
     Args:
-        require: numbers or quantities.
+        require: numbers or quantities; what is infinite leaves a side open, as None does.
         unit_of: the SI unit of a name, which is asked for where a limit has units; None where it is not known.
 
     Raises:
@@ -52,12 +52,16 @@ def limits_of(require: Mapping[str, Any], unit_of: Callable[[str], str | None]) 
                 )
         pair = limits_in_si(f"require['{name}']", given, unit_of(name)) if any(map(is_quantity, sides)) else given
         try:
-            low, high = (None if side is None else float(side) for side in pair)
+            low, high = (
+                None if side is None or float(side) == beyond else float(side)
+                for side, beyond in zip(pair, (-math.inf, math.inf), strict=True)
+            )
         except (TypeError, ValueError):
             raise ParameterError(
                 f"require['{name}'] = {given!r} must be (low, high); None leaves a side open."
             ) from None
-        if not (-math.inf if low is None else low) <= (math.inf if high is None else high):
+        ends = [end for end in (low, high) if end is not None]
+        if not all(map(math.isfinite, ends)) or ends != sorted(ends):
             raise ParameterError(
                 f"require['{name}'] = {given!r}: no value is at least {low} and at most {high}. Write (low, high)."
             )

@@ -23,9 +23,9 @@ from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import SimulationError
 from shaftwork.numerics.tolerances import SAME, TYPED
 from shaftwork.pipeline.model import Model
-from shaftwork.sensitivities.carrying import End, SensitivityTransfer
 from shaftwork.sensitivities.differentiation import Differentiated
 from shaftwork.sensitivities.legs import LATE, Leg
+from shaftwork.sensitivities.sensitivity_transfer import End, SensitivityTransfer
 
 if TYPE_CHECKING:
     from shaftwork.hybrid.hybrid_state import Transition
@@ -128,7 +128,7 @@ class JumpConditions:
 
     Args:
         equations: those of a model, ready for sensitivities.
-        carrying: takes states over into other equations; None where no part changes its mode.
+        transfer: takes states over into other equations; None where no part changes its mode.
         sizes: (n,) of the states of a model.
         swiftest: (N,) the largest rates of a model in the motion.
         span: length of the run, s.
@@ -137,12 +137,12 @@ class JumpConditions:
     def __init__(
         self,
         equations: Callable[[Model], Differentiated],
-        carrying: SensitivityTransfer | None,
+        transfer: SensitivityTransfer | None,
         sizes: Callable[[Model], Array],
         swiftest: Callable[[Model], Array],
         span: float,
     ) -> None:
-        self._equations, self._carrying, self._sizes, self._swiftest = equations, carrying, sizes, swiftest
+        self._equations, self._transfer, self._sizes, self._swiftest = equations, transfer, sizes, swiftest
         self._span = span
 
     def over(self, before: Leg, after: Leg, slopes: Array, transitions: Sequence[Transition]) -> Jump:
@@ -166,8 +166,8 @@ class JumpConditions:
         if not single:
             return Jump(self._one_by_one(old, new, slopes, ends[-1].groups, adds=adds), None, adds, 0.0)
         end, total = single[-1], single[-1].total
-        if self._carrying is not None and not adds:
-            k, carried = self._carrying.over(before, after, [one.end for one in single], transitions)
+        if self._transfer is not None and not adds:
+            k, carried = self._transfer.over(before, after, [one.end for one in single], transitions)
             end, total = single[k], np.concatenate([carried, single[k].total[len(old.x) :]])
         new_slopes = self._later(end.new, total - np.outer(end.new.rates, end.shift), end.late)
         share = self._share(before.model, slopes, new_slopes) if adds else 1.0
