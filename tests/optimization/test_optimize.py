@@ -31,6 +31,14 @@ def test_the_ratio_of_the_largest_acceleration_matches_the_inertias() -> None:
     assert best.designed.compile().parameters["gear.ratio"] == best.values["gear.ratio"]
 
 
+def test_a_best_design_at_an_end_of_a_range_is_said_to_be_there() -> None:
+    inner = sw.optimize(axis(), {"gear.ratio": (2.0, 60.0)}, "end JL.omega", t_end=1.0, maximize=True)
+    outer = sw.optimize(axis(), {"gear.ratio": (2.0, 15.0)}, "end JL.omega", t_end=1.0, maximize=True)
+    assert inner.best.at_ends == ()
+    assert outer.best.at_ends == ("gear.ratio",)
+    assert "15  an end of its range" in str(outer)
+
+
 def test_a_limit_that_binds_is_kept() -> None:
     # the motor turns i times as fast: i^2 tau / (J_L + i^2 J_M) = 80 at i^2 = 80 J_L / (tau - 80 J_M)
     best = sw.optimize(
@@ -314,6 +322,10 @@ def test_nothing_is_asked_outside_the_ranges() -> None:
         ({"require": {"end JL.omega": ("a", None)}}, r"is a text"),
         ({"functions": {"size": len}}, "a function without limits"),
         ({"choices": {"motor": []}}, "nothing to choose"),
+        (
+            {"choices": {"motor": [LIGHT, {"motor.tau": 3.0}]}},
+            r"choices\['motor'\]: number 1 has no 'JM\.J', which another",
+        ),
         ({"choices": {"motor": [3.0]}}, r"choices\['motor'\] holds 3\.0"),
         ({"choices": {"box": [{"gear.ratio": 3.0}]}}, r"'gear\.ratio' is in variables and in choices\['box'\]"),
         ({"choices": {"one": [LIGHT], "two": [HEAVY]}}, r"'motor\.tau' is in choices\['one'\] and in choices\['two'\]"),

@@ -24,7 +24,7 @@ it starts anew from its end, as it does from a better design that it has met on 
 may fall by 36 digits."""
 
 
-class End(NamedTuple):
+class DescentEnd(NamedTuple):
     """Where a descent ended.
 
     Args:
@@ -66,13 +66,14 @@ class Descent:
         sign: float,
     ) -> None:
         self._motion, self._limits, self._name, self._sign = motion, limits, name, sign
+        self.ranges = ranges
         self._low, self._high = np.array(list(ranges.values())).T
         self._size, self._constraints = 1.0, list[dict[str, Any]]()
         self._tried, self._begun, self._since = set[bytes](), list[Array](), 0
         self._better = list[tuple[float, float, Array]]()
         """By how much each that was better misses the limits, its goal, and its variables."""
 
-    def run(self, start: Array) -> End:
+    def run(self, start: Array) -> DescentEnd:
         """From a start to the end.
 
         Args:
@@ -88,9 +89,9 @@ class Descent:
         if self._anew(end) is None:
             return end
         message = f"given up after {RESTARTS} new starts, each of which came to better designs"
-        return End(end.variables, message, success=False)
+        return DescentEnd(end.variables, message, success=False)
 
-    def _anew(self, end: End) -> Array | None:
+    def _anew(self, end: DescentEnd) -> Array | None:
         """Where to start anew: at what was better on the way, or at the end of a long fall; None for nowhere."""
         best, values = self._best(), self._values(end.variables)
         if self._gained(end.variables, best) and not any(np.array_equal(best, one) for one in self._begun):
@@ -113,7 +114,7 @@ class Descent:
         """Each goal."""
         return {of: value for of, (value, _) in self._motion.at(variables).items()}
 
-    def _once(self, start: Array) -> End:
+    def _once(self, start: Array) -> DescentEnd:
         """From a start to where SLSQP ends; the best design so far where that is no minimum."""
         self._begun.append(start)
         self._size, self._since = self._size_at(start), 0
@@ -129,8 +130,10 @@ class Descent:
                 options={"ftol": TYPED, "maxiter": MOST_DESIGNS * (1 + start.size)},
             )
         except _Ended as end:
-            return End(self._best(), str(end), success=False)
-        return End(self._variables(result.x) if result.success else self._best(), str(result.message), result.success)
+            return DescentEnd(self._best(), str(end), success=False)
+        return DescentEnd(
+            self._variables(result.x) if result.success else self._best(), str(result.message), result.success
+        )
 
     def _best(self) -> Array:
         """Variables of the design that misses limits least; of several, of the one whose goal is best."""

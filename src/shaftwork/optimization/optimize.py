@@ -13,7 +13,8 @@ from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import ParameterError
 from shaftwork.core.screen import progress
 from shaftwork.numerics.even_points import even_points
-from shaftwork.optimization.descent import Descent, End
+from shaftwork.numerics.tolerances import EQUAL
+from shaftwork.optimization.descent import Descent, DescentEnd
 from shaftwork.optimization.measured_motion import Goal, MeasuredMotion
 from shaftwork.optimization.optimum import Attempt, Optimum
 from shaftwork.pipeline.arguments import (
@@ -140,7 +141,14 @@ def _combinations(
     for name, sets in lists.items():
         if wrong := [one for one in sets if not isinstance(one, Mapping)]:
             raise ParameterError(f"choices['{name}'] holds {wrong[0]!r}. Give sets of values, such as {{'J1.J': 2.0}}.")
-        for key in dict.fromkeys(key for one in sets for key in one):
+        keys = dict.fromkeys(key for one in sets for key in one)
+        for number, one in enumerate(sets):
+            if lacking := [key for key in keys if key not in one]:
+                raise ParameterError(
+                    f"choices['{name}']: number {number} has no '{lacking[0]}', which another one has. Give all of "
+                    "them the same parameters."
+                )
+        for key in keys:
             if setters.setdefault(key, f"choices['{name}']") != f"choices['{name}']":
                 raise ParameterError(f"'{key}' is in {setters[key]} and in choices['{name}']. Leave it out of one.")
     combinations = []
@@ -167,7 +175,13 @@ def _attempt(
     descent: Descent,
 ) -> Attempt:
     before = motion.motions
-    end = End(start, "", success=False) if motion.undefined(start) else descent.run(start)
+    end = DescentEnd(start, "", success=False) if motion.undefined(start) else descent.run(start)
     goals = {of: value for of, (value, _) in motion.at(end.variables).items()}
     message, values = motion.undefined(end.variables) or end.message, {**fixed, **motion.values(end.variables)}
-    return Attempt(choice, values, goals, message, end.success, motion.motions - before)
+    at_ends = tuple(name for name, span in descent.ranges.items() if _ends_at(values[name], span))
+    return Attempt(choice, values, goals, message, end.success, motion.motions - before, at_ends)
+
+
+def _ends_at(value: float, span: tuple[float, float]) -> bool:
+    """Whether a value is an end of its range, to a millionth of this."""
+    return min(value - span[0], span[1] - value) <= EQUAL * (span[1] - span[0])

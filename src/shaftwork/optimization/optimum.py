@@ -28,6 +28,7 @@ class Attempt:
         message: why it ended; of one without a finite value of every goal which has none.
         success: whether it ended where the goal is least nearby.
         motions: computed for it.
+        at_ends: the variables that ended at an end of their range.
     """
 
     choice: Mapping[str, int]
@@ -36,6 +37,7 @@ class Attempt:
     message: str
     success: bool
     motions: int
+    at_ends: tuple[str, ...] = ()
 
     @property
     def complete(self) -> bool:
@@ -111,7 +113,8 @@ class Optimum:
             f"{self.network.name}: {self.goal} {verb} at {best.goals[self.goal]:.6g}, by "
             f"{counted(len(self.attempts), 'descent')} and {sum(a.motions for a in self.attempts)} motions"
         )
-        rows = [[name, f"{value:.6g}", ""] for name, value in best.values.items()]
+        ends = dict.fromkeys(best.at_ends, "an end of its range")
+        rows = [[name, f"{value:.6g}", ends.get(name, "")] for name, value in best.values.items()]
         rows += [[name, f"{value:.6g}", self._said(name)] for name, value in best.goals.items()]
         rows += [[name, f"number {number}", "chosen"] for name, number in best.choice.items()]
         rows += [] if best.success else [["no minimum yet", "", best.message]]
