@@ -263,6 +263,9 @@ def test_bands_hold_the_courses_and_the_mean() -> None:
     assert high[-1] - low[-1] == pytest.approx(2 * 1.96 * 0.25 / 20, rel=0.1)
     low, high = made.of_courses
     assert high[-1] - low[-1] == pytest.approx(2 * 1.96 * 0.25, rel=0.15)  # a quantile of 400 samples
+    title, _, *rows = str(made).splitlines()
+    assert title == "two motors: J.omega in rad/s of 400 courses, to 95 %"
+    assert [float(row.split()[0]) for row in rows] == pytest.approx(np.linspace(0.0, 1.0, 11))
 
 
 def test_a_sample_that_is_not_admissible_is_named() -> None:

@@ -12,8 +12,9 @@ from scipy import stats
 
 from shaftwork.codegen.model_observer import ModelObserver
 from shaftwork.core.errors import AccuracyWarning, NetworkWarning, ParameterError, SimulationError, no_quantity
+from shaftwork.core.notebook import html_table
 from shaftwork.core.notices import muted, warn
-from shaftwork.core.screen import counted
+from shaftwork.core.screen import counted, in_columns
 from shaftwork.pipeline.arguments import inner_share, seed_number
 from shaftwork.pipeline.network import Network, network_of
 from shaftwork.results.observer import Array, array_in_si
@@ -66,6 +67,24 @@ class Bands:
         count = len(self.courses)
         half = stats.t.ppf((1 + self.level) / 2, count - 1) * self.courses.std(axis=0, ddof=1) / np.sqrt(count)
         return self.mean - half, self.mean + half
+
+    def _rows(self) -> tuple[str, list[str], list[list[str]]]:
+        """Title, headings, and rows at eleven of the times, or all where they are fewer."""
+        unit = f" in {self.unit}" if self.unit != "1" else ""
+        title = (
+            f"{self.name}: {self.quantity}{unit} of {counted(len(self.courses), 'course')}, to {100 * self.level:g} %"
+        )
+        columns = [self.t, self.mean, *self.of_mean, *self.of_courses]
+        shown = np.unique(np.linspace(0, self.t.size - 1, min(self.t.size, 11)).round().astype(int))
+        rows = [[f"{column[k]:.6g}" for column in columns] for k in shown.tolist()]
+        return title, ["t in s", "mean", "from", "to", "courses from", "to"], rows
+
+    def __str__(self) -> str:
+        title, header, rows = self._rows()
+        return "\n".join([title, *in_columns([header, *rows], range(len(header)))])
+
+    def _repr_html_(self) -> str:
+        return html_table(*self._rows())
 
     def plot(self) -> Figure:
         """The mean, its confidence band and the band of the courses (extra `plot`).
