@@ -116,7 +116,10 @@ def _ranges(net: Network, variables: Any) -> dict[str, tuple[float, float]]:
         ParameterError: there is no such parameter, or a range is none.
     """
     if not (isinstance(variables, Mapping) and variables):
-        raise ParameterError("Nothing is variable. Give ranges, such as {'shaft.c': (1e4, 5e4)}.")
+        raise ParameterError(
+            "Nothing is variable. Give ranges, such as {'shaft.c': (1e4, 5e4)}. Sets of values alone are compared by "
+            "studies.sweep(net, samples={...})."
+        )
     netlist, ranges = network_of(net).netlist(), dict[str, tuple[float, float]]()
     for name, span in variables.items():
         low, high = range_of(name, span, partial(checked_parameter, netlist, name))
