@@ -238,6 +238,9 @@ def test_damaged_files_are_read_or_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings(
+    "ignore::shaftwork.NetworkWarning"
+)  # a value that was changed may be one that a part warns of
 def test_what_a_file_says_is_read_or_refused_however_it_is_changed() -> None:
     sol, chance = motion("hybrid"), random.Random(6)  # noqa: S311
     said = record_text(sol, sol.again)
