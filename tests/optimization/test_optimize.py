@@ -36,7 +36,7 @@ def test_a_best_design_at_an_end_of_a_range_is_said_to_be_there() -> None:
     outer = sw.optimize(axis(), {"gear.ratio": (2.0, 15.0)}, "end JL.omega", t_end=1.0, maximize=True)
     assert inner.best.at_ends == ()
     assert outer.best.at_ends == ("gear.ratio",)
-    assert "15  an end of its range" in str(outer)
+    assert "15  1      an end of its range" in str(outer)
 
 
 def test_a_limit_that_binds_is_kept() -> None:
@@ -312,6 +312,9 @@ def test_nothing_is_asked_outside_the_ranges() -> None:
         ({"variables": {"gear.ratio": (3.0, 2.0)}}, "is no range"),
         ({"variables": {"gear.i": (3.0, 2.0)}}, "no parameter 'gear.i'"),
         ({"goal": "JL.omega"}, "is no measure"),
+        ({"goal": 5}, "goal = 5 must be a measure, or a function of all parameters"),
+        ({"functions": {"price": "max JL.omega"}, "require": {"price": (0, 1)}}, r"functions\['price'\] = 'max"),
+        ({"choices": {"a": 5}}, r"choices\['a'\] must be a list of sets"),
         ({"goal": "damage JL.omega"}, "no derivative"),
         ({"starts": 0}, "starts = 0"),
         ({"seed": -1}, "seed = -1 must be a whole number, 0 or more"),
@@ -351,6 +354,47 @@ def test_a_function_without_a_finite_value_is_named_with_the_place(value: float)
     for optimum, name in ((as_goal, "objective"), (as_limit, "price")):
         with pytest.raises(sw.SimulationError, match=rf"{name} is {value:g} at gear\.ratio = 5\. Give functions"):
             _ = optimum.best
+
+
+def test_a_function_that_fails_at_one_design_ends_no_other_start() -> None:
+    def price(values: Mapping[str, float]) -> float:
+        return 1.0 / (values["gear.ratio"] - 5.0) if values["gear.ratio"] <= 5.0 else values["gear.ratio"]
+
+    made = sw.optimize(axis(), {"gear.ratio": (2.0, 60.0)}, price, t_end=1.0, starts=4)  # the first is at 5
+    (failed,) = [attempt.message for attempt in made.attempts if not attempt.complete]
+    assert failed.startswith("the function 'objective' raises ZeroDivisionError: ")
+    assert any(attempt.success for attempt in made.attempts)
+    with pytest.raises(sw.SimulationError, match=r"'objective' raises KeyError: 'gear' at gear\.ratio = 5"):
+        _ = sw.optimize(axis(), {"gear.ratio": (2.0, 60.0)}, lambda values: values["gear"], t_end=1.0).best
+
+
+@pytest.mark.parametrize("shift", np.linspace(0.1, 1.0, 10))
+def test_a_limit_of_zero_is_met_to_a_millionth_of_what_is_limited(shift: float) -> None:
+    level = 17.0 + shift
+    made = sw.optimize(
+        axis(),
+        {"gear.ratio": (2.0, 60.0)},
+        lambda values: values["gear.ratio"],
+        t_end=1.0,
+        functions={"margin": lambda values: values["gear.ratio"] ** 1.5 - level**1.5},
+        require={"margin": (0.0, None)},
+    )
+    assert made.values["gear.ratio"] == pytest.approx(level, rel=1e-6)  # as far as the limit is told apart
+
+
+@pytest.mark.parametrize("steady", [False, True])
+def test_a_variable_that_is_zero_in_the_network_is_named(*, steady: bool) -> None:
+    net = axis()
+    net.add(sw.Damper("oil", d=0.0), "drum")
+    with pytest.raises(sw.ParameterError, match=r"'oil\.d' is zero in the network"):
+        sw.optimize(net, {"oil.d": (1.0, 50.0)}, "max JL.omega", t_end=1.0, steady=steady)
+
+
+def test_the_table_has_units() -> None:
+    made = sw.optimize(axis(), {"gear.ratio": (2.0, 60.0)}, "max JL.omega", t_end=1.0, maximize=True)
+    lines = str(made).splitlines()
+    assert lines[1].split() == ["best", "unit"]
+    assert lines[3].split()[-2:] == ["rad/s", "goal"]
 
 
 def test_at_the_edge_of_a_function_the_slope_is_that_of_the_side_which_has_values() -> None:

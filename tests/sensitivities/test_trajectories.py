@@ -52,10 +52,23 @@ def test_a_start_value_counts_until_the_drive_sticks() -> None:
     assert made["J.omega"]["brake.tau"] == pytest.approx([-0.25, -0.5, 0.0], abs=1e-9)
 
 
+def test_names_given_twice_are_one() -> None:
+    net, names = sw.scenes.crane_start(), ["shaft.c", "shaft.c"]
+    made = sw.studies.trajectory_sensitivities(
+        net, "shaft.tau", [1.0], parameters=names, starts=["J1.omega", "J1.omega"]
+    )
+    assert tuple(made.parameters) == ("shaft.c", "J1.omega")
+    assert tuple(sw.studies.frequency_sensitivities(net, parameters=names).parameters) == ("shaft.c",)
+
+
 def test_what_is_wrong_with_times_and_names_is_said() -> None:
     net = sw.scenes.crane_start()
     with pytest.raises(sw.ParameterError, match="ascend from zero"):
         sw.studies.trajectory_sensitivities(net, "shaft.tau", [1.0, 0.5])
+    with pytest.raises(sw.ParameterError, match="ascend from zero or later, and end later"):
+        sw.studies.trajectory_sensitivities(net, "shaft.tau", [0.0])
+    with pytest.raises(sw.ParameterError, match="5 is no name"):
+        sw.studies.trajectory_sensitivities(net, "shaft.tau", [1.0], parameters=5)  # type: ignore[arg-type]
     with pytest.raises(sw.SignalError, match="No quantity is named"):
         sw.studies.trajectory_sensitivities(net, [], [1.0])
     with pytest.raises(sw.SignalError, match=r"'shaft' has:"):

@@ -259,7 +259,7 @@ def test_a_variant_that_does_not_pass_says_which_limits_it_misses_or_why_it_fail
     made.to_csv(tmp_path / "t.csv")
     with (tmp_path / "t.csv").open(newline="") as file:
         assert [row["reason"] for row in csv.DictReader(file)] == texts
-    assert texts[0] in str(made).splitlines()[2]
+    assert texts[0] in str(made).splitlines()[3]
     assert len(made.best("largest", ignore_require=True)) == 3  # none of those that failed
 
 
@@ -400,7 +400,7 @@ def test_results_are_a_table_a_file_and_a_picture(tmp_path: Path) -> None:
     assert list(made.table().columns) == ["shaft.c", "max shaft.tau", "passed", "reason"]
     pytest.importorskip("matplotlib")
     (axes,) = made.plot().axes
-    assert [tick.get_text() for tick in axes.get_xticklabels()] == ["shaft.c", "max shaft.tau"]
+    assert [tick.get_text() for tick in axes.get_xticklabels()] == ["shaft.c\nin N*m/rad", "max shaft.tau\nin N*m"]
     tau = made.measures["max shaft.tau"]
     limits = [line.get_ydata()[0] for line in axes.lines if line.get_color() == "tab:red"]
     np.testing.assert_allclose(limits, (np.array([0.0, 9.99]) - tau.min()) / (np.ptp(tau) or 1.0))
@@ -450,6 +450,17 @@ def test_a_guard_that_is_met_just_after_a_sample_leaves_extremes_right() -> None
     for name in names:
         size = np.abs(slow.measures["max J1.omega"] if name.endswith("omega") else 100.0).max()  # of the motion
         np.testing.assert_allclose(fast.measures[name], slow.measures[name], atol=1e-9 * size, rtol=0, err_msg=name)
+
+
+def test_a_picture_of_many_variants_shows_some_all_over_the_table_and_says_so() -> None:
+    pytest.importorskip("matplotlib")
+    columns = {"J.J": np.repeat([1.0, 2.0, 3.0], 1000), "d.d": np.tile(np.arange(1000.0), 3)}
+    made = sw.studies.Sweep("many", columns, {"y": columns["d.d"]}, {}, ("",) * 3000)
+    (axes,) = made.plot().axes
+    lines = np.array(axes.collections[0].get_segments())[:, :, 1]
+    assert len(lines) == 2000
+    assert {*np.unique(lines[:, 0]).tolist()} == {0.0, 0.5, 1.0}
+    assert axes.get_title() == "many: 3000 variants, 3000 meet the requirements, 2000 of them shown"
 
 
 def test_what_none_passes_is_a_table_of_no_rows() -> None:

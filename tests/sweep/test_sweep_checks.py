@@ -211,8 +211,33 @@ def test_a_measure_that_other_processes_do_not_find_is_refused_where_they_are_as
     call: dict[str, Any] = {"t_end": 0.1, "measures": {"speed": lambda solution: float(solution["J.omega"][-1])}}
     net = train(sw.Damper("oil", d=1.0))
     assert not sw.studies.sweep(net, {"J.J": [1.0, 2.0]}, **call).failed.any()
-    with pytest.raises(sw.ParameterError, match=r"processes = 2: other processes do not find a measure .* lambda"):
+    with pytest.raises(
+        sw.ParameterError, match=r"processes = 2: other processes do not find the measure 'speed'.* lambda"
+    ):
         sw.studies.sweep(net, {"J.J": [1.0, 2.0]}, processes=2, **call)
+
+
+def test_a_part_of_a_class_that_other_processes_do_not_find_is_named(limited: Any) -> None:
+    net = train(limited("load", least=1.0, most=2.0))
+    call: dict[str, Any] = {"t_end": 0.1, "measures": ["end J.omega"], "engine": "scipy"}
+    assert not sw.studies.sweep(net, {"J.J": [1.0, 2.0]}, **call).failed.any()
+    with pytest.raises(sw.ParameterError, match=r"processes = 2: other processes do not find the class of 'load'"):
+        sw.studies.sweep(net, {"J.J": [1.0, 2.0]}, processes=2, **call)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"initial": {"J.omega": np.nan}}, r"the start value of 'J\.omega' = nan must be a finite number"),
+        ({"initial": {"J.omega": "x"}}, r"the start value of 'J\.omega' = 'x'"),
+        ({"t_eval": [0.0, 100.0]}, "t_eval must hold strictly increasing times between 0 and 0.1 s"),
+        ({"samples": {"J.J": np.ma.masked_array([1.0, 2.0], [False, True])}}, r"'J\.J' has values that are masked"),
+    ],
+)
+def test_what_is_wrong_for_all_variants_is_no_reason_of_each(change: dict[str, Any], words: str) -> None:
+    call: dict[str, Any] = {"samples": {"J.J": [1.0, 2.0]}, "t_end": 0.1, "measures": ["end J.omega"], **change}
+    with pytest.raises(sw.ParameterError, match=words):
+        sw.studies.sweep(train(sw.Damper("oil", d=1.0)), **call)
 
 
 def test_a_named_engine_follows_each_variant_by_itself() -> None:

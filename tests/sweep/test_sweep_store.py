@@ -193,3 +193,13 @@ def test_variants_that_are_stored_twice_count_once(tmp_path: Path) -> None:
     assert again.why == whole.why
     assert again.why.startswith("1 of 16 variants ran one by one")
     np.testing.assert_array_equal(again.measures["end J.omega"], whole.measures["end J.omega"])
+
+
+@pytest.mark.parametrize(
+    "measure", [lambda _: 1.0, partial(max, key=lambda _: 1.0), object.__new__(type("F", (), {"__call__": len}))]
+)
+def test_a_store_takes_no_function_that_it_could_not_tell_from_another_one(tmp_path: Path, measure: Any) -> None:
+    net = sw.Network("start")
+    net.add(sw.Inertia("J", J=1.0), "a")
+    with pytest.raises(sw.ParameterError, match="measure 'mine' is a lambda, or has no name that stays the same"):
+        sw.studies.sweep(net, {"J.J": [1.0]}, t_end=0.1, measures={"mine": measure}, store=tmp_path / "store.sqlite")

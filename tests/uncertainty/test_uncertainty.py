@@ -275,7 +275,7 @@ def test_a_sample_that_is_not_admissible_is_named() -> None:
     ):
         with pytest.raises(sw.ParameterError, match=words):
             sw.studies.bands(sw.scenes.crane_start(), "shaft.tau", [0.0, 0.1], {"J1.J": values}, samples=None)
-    with pytest.raises(sw.ParameterError, match=r"'one': tau = .* in row \d+ of 'one\.tau' must be a finite number"):
+    with pytest.raises(sw.ParameterError, match=r"'one\.tau': cauchy.* inf.* has no values\. Deviations and scales"):
         uncertainty(
             two_motors(), {"one.tau": stats.cauchy(0.0, np.inf)}, measures=["end J.omega"], t_end=1.0, samples=8
         )
@@ -356,6 +356,8 @@ def test_bands_over_seeds_take_each_seed_once() -> None:
         ({"distributions": {"one.tau": 3.0}}, "is no distribution"),
         ({"distributions": {"one.tau": (2.0, 1.0)}}, "is no distribution"),
         ({"distributions": {"one.tua": (1.0, 2.0)}}, "no parameter 'one.tua'"),
+        ({"distributions": {"one.tau": stats.norm}}, "'one.tau': norm has no parameters yet"),
+        ({"distributions": {"one.tau": stats.norm(1.0, -0.1)}}, r"'one.tau': norm\(\(1\.0, -0\.1\).* has no values"),
         ({"distributions": {"J.J": (-1.0, 1.0)}}, "J = -"),
         ({"method": "fast"}, "no method 'fast'"),
         ({"samples": 1}, "2 or more"),
@@ -374,6 +376,47 @@ def test_what_is_wrong_is_said(change: dict[str, object], words: str) -> None:
     }
     with pytest.raises(sw.ParameterError, match=words):
         uncertainty(two_motors(), **arguments)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("function", "options", "words"),
+    [
+        (lambda _: {}, {}, r"gives \{\}\. It must give columns"),
+        (lambda columns: columns["a"], {}, "It must give columns of results by measure"),
+        (ishigami, {"measures": ["max y"]}, "measures is for a network"),
+        (ishigami, {"t_end": 3.0}, "t_end is for a network"),
+    ],
+)
+def test_what_is_wrong_about_a_function_is_said(function: Any, options: dict[str, Any], words: str) -> None:
+    with pytest.raises(sw.ParameterError, match=words):
+        uncertainty(function, dict.fromkeys("abc", (-PI, PI)), samples=4, **options)
+
+
+def test_samples_that_all_failed_have_no_mean_and_no_quantiles() -> None:
+    made = uncertainty(lambda columns: {"y": np.full(columns["a"].size, np.nan)}, {"a": (0.0, 1.0)}, samples=4)
+    for read in (made.mean, made.quantiles, made.values):
+        with pytest.raises(
+            sw.SimulationError, match=r"'y' has no values: .* 4 samples, 4 failed, the first: no finite"
+        ):
+            read("y")
+
+
+def test_both_kinds_of_distributions_of_scipy_are_taken() -> None:
+    old = uncertainty(ishigami, dict.fromkeys("abc", stats.norm(0.1, 0.2)), samples=8)
+    new = uncertainty(ishigami, dict.fromkeys("abc", stats.Normal(mu=0.1, sigma=0.2)), samples=8)
+    assert new.values("y") == pytest.approx(old.values("y"), rel=1e-12)  # two formulas of one quantile
+
+
+def test_tables_and_bands_have_units_and_bands_no_options_of_their_own_times() -> None:
+    made = uncertainty(two_motors(), {"one.tau": (0.0, 1.0)}, measures=["end J.omega"], t_end=1.0, samples=4)
+    assert str(made).splitlines()[1].split()[:2] == ["unit", "mean"]
+    assert str(made).splitlines()[2].split()[2] == "rad/s"
+    for option in ({"t_end": 2.0}, {"measures": ["end J.omega"]}, {"t_eval": 3}):
+        with pytest.raises(sw.ParameterError, match=f"bands has no {next(iter(option))}"):
+            sw.studies.bands(two_motors(), "J.omega", [0.0, 1.0], {"one.tau": (0.0, 1.0)}, **option)
+    for times in ([-1.0, 0.1], [0.0]):
+        with pytest.raises(sw.ParameterError, match="ascend from zero or later"):
+            sw.studies.bands(two_motors(), "J.omega", times, {"one.tau": (0.0, 1.0)})
 
 
 def test_pictures_and_tables_show_all_measures() -> None:

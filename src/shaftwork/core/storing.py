@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import fields
+from pathlib import Path
 from typing import Any
 
 
@@ -11,3 +13,15 @@ class StoredByFields:
 
     def __getstate__(self) -> dict[str, Any]:
         return {item.name: getattr(self, item.name) for item in fields(self)}  # type: ignore[arg-type]
+
+
+def is_found_elsewhere(thing: Any) -> bool:
+    """Whether another process finds a function or a class, or the class of something else, by its name.
+
+    It does not find what is inside a function, in a notebook, or in a script that is no file.
+    """
+    named = thing if hasattr(thing, "__qualname__") else type(thing)
+    is_here = named.__module__ == "__main__"
+    return "<" not in named.__qualname__ and not (
+        is_here and not Path(getattr(sys.modules["__main__"], "__file__", "")).is_file()
+    )

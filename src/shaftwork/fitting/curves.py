@@ -14,6 +14,7 @@ from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import CompileError, ParameterError, ShaftworkError, SimulationError
 from shaftwork.numerics.differences import differences
+from shaftwork.pipeline.arguments import closer
 from shaftwork.pipeline.model import Model
 from shaftwork.results.solution import Solution
 from shaftwork.sensitivities.legs import DifferentiatedMotion
@@ -245,9 +246,10 @@ class RecordedResponse:
 
     def values(self, parameters: Mapping[str, float]) -> Array:
         """(N,) computed."""
+        outputs, inputs = (tuple(dict.fromkeys(names)) for names in zip(*self._samples, strict=True))
+        linear = self._model.linearize(self._at, inputs=inputs, outputs=outputs, parameters=parameters)
         parts: list[Array] = []
         for (output, source), f in self._samples.items():
-            linear = self._model.linearize(self._at, inputs=[source], outputs=[output], parameters=parameters)
             response = linear.frequency_response(source, output, f).values
             parts += [np.asarray(response.real), np.asarray(response.imag)]
         return np.concatenate(parts)
@@ -278,8 +280,8 @@ def last_of(samples: Mapping[str, Array]) -> float:
     return max(float(times[-1]) for times in samples.values())
 
 
-_MOTIONS = BoundedCache[tuple[Any, ...], tuple[Mapping[str, float], ParametricMotion]](1)
-"""Of the last fit, with the values for which it was made: the next one like it compiles nothing."""
+_MOTIONS = BoundedCache[tuple[Any, ...], tuple[Mapping[str, float], ParametricMotion]]()
+"""Of the last records, with the values for which each was made: the next fit like the last one compiles nothing."""
 
 
 def recorded_motion(
@@ -306,6 +308,6 @@ def recorded_motion(
     try:
         at, motion = _MOTIONS(key, lambda: (start, ParametricMotion(model, *names, span, states, rtol, starts, values)))
     except (CompileError, SimulationError):  # too large for symbols, or sampled
-        return SimulatedMotion(model, samples, initial, 1e-2 * rtol)
+        return SimulatedMotion(model, samples, initial, closer(rtol))
     order = [list(motion.parameters).index(name) for name in start]
     return RecordedMotion(motion, samples, order, (at, motion.nominal))

@@ -50,7 +50,6 @@ class Estimate:
         step: (m,) from here to where the minimum were without bounds, as far as derivatives tell.
         bounds: (m,) and (m,) of the unknowns.
         at_bounds: (m,) which unknowns ended at one.
-        evaluations: motions computed over the whole record.
         message: why it is no minimum yet; empty where it is one.
         deviance: minus twice the logarithm of the likelihood, but for a constant; a difference counts like one of
             chi^2.
@@ -66,7 +65,6 @@ class Estimate:
     step: Array
     bounds: tuple[Array, Array]
     at_bounds: NDArray[np.bool_]
-    evaluations: int
     message: str
     deviance: float
 
@@ -113,7 +111,7 @@ def estimate(
         SimulationError: the motion at the start cannot be computed.
     """
     unknowns, deviations = _begun(curves, data, start, bounds, beginning)
-    result, deviations, evaluations, message = _settled(curves, data, unknowns, deviations, bounds, effort)
+    result, deviations, message = _settled(curves, data, unknowns, deviations, bounds, effort)
     unknowns, at_bounds = result.x, result.active_mask != 0
     residuals, slopes, wide = curves.values(unknowns) - data.measured, curves.slopes(unknowns), stretch(unknowns)
     found = spreads(slopes, residuals, data, deviations, unknowns, wide)
@@ -122,9 +120,7 @@ def estimate(
         unknowns, residuals = np.clip(unknowns + step, *bounds), residuals + slopes @ step
     deviance = _deviance(residuals, data, deviations, unknowns)
     told = (found.directions, found.spreads, found.step, bounds, at_bounds)
-    return Estimate(
-        unknowns, found.covariance, found.freedom, deviations, residuals, *told, evaluations, message, deviance
-    )
+    return Estimate(unknowns, found.covariance, found.freedom, deviations, residuals, *told, message, deviance)
 
 
 def _is_last(step: Array, stretch: Array, covariance: Array) -> bool:
@@ -163,10 +159,10 @@ def _begun(
 
 def _settled(
     curves: Curves, data: Data, unknowns: Array, deviations: Array, bounds: tuple[Array, Array], effort: tuple[int, int]
-) -> tuple[Any, Array, int, str]:
-    """Scipy's last result, deviations (series,), motions computed, and why it is no minimum, if it is none."""
+) -> tuple[Any, Array, str]:
+    """Scipy's last result, deviations (series,), and why it is no minimum, if it is none."""
     alone = deviations.size == 1 and data.loss == "linear" and np.isnan(data.priors).all()
-    settled, evaluations, message = data.deviations is not None or alone, 0, ""
+    settled, message = data.deviations is not None or alone, ""
     # A ten-thousandth of its deviation is the last step, which derivatives tell to more than that.
     last_gain = 1e-8 / data.measured.size
     rounds, motions = effort
@@ -174,7 +170,6 @@ def _settled(
         # While the deviations change, the minimum moves with them.
         gain = last_gain if settled else 1e-5
         last, result = settled, _fitted(curves, data, deviations, unknowns, bounds, gain, motions)
-        evaluations += int(result.nfev)
         message = "" if result.status > 0 else str(result.message).rstrip(".")
         unknowns = result.x
         if data.deviations is None:
@@ -182,8 +177,8 @@ def _settled(
             deviations = _noise(residuals, data, degrees(curves.slopes(unknowns), data, before))
             settled = alone or bool((np.abs(deviations - before) <= 1e-4 * deviations).all())
         if settled and last:
-            return result, deviations, evaluations, message
-    return result, deviations, evaluations, message or f"the noise has not settled in {rounds} rounds"
+            return result, deviations, message
+    return result, deviations, message or f"the noise has not settled in {rounds} rounds"
 
 
 def _led(
@@ -209,15 +204,18 @@ def _led(
 
 
 def _noise(residuals: Array, data: Data, freedom: Array) -> Array:
-    """(series,) standard deviations of the noise from what is left, with degrees of freedom (series,)."""
+    """(series,) standard deviations of the noise from what is left, with degrees of freedom (series,).
+
+    Where these are none it is the size of what is left.
+    """
     count = len(data.counts)
     if data.loss != "linear":
         sizes = np.array([robust_size(residuals[data.series == k], freedom[k]) for k in range(count)])
     else:
-        sizes = np.sqrt(np.bincount(data.series, residuals**2) / np.maximum(freedom, EQUAL))
+        sizes = np.sqrt(np.bincount(data.series, residuals**2) / np.where(freedom > EQUAL, freedom, data.counts))
     heights = np.array([np.abs(data.measured[data.series == k]).max() for k in range(count)])
-    # A record without noise is fitted to rounding.
-    return np.asarray(np.maximum(sizes, 1e-12 * np.maximum(heights, np.finfo(float).tiny)))
+    # A record without noise is fitted to rounding; one of zeros has no size.
+    return np.asarray(np.maximum(sizes, 1e-12 * np.where(heights > 0, heights, 1.0)))
 
 
 def _fitted(

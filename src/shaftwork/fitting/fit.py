@@ -32,6 +32,7 @@ from shaftwork.fitting.spreads import LOSSES, Data
 from shaftwork.network.netlist import Netlist
 from shaftwork.numerics.tolerances import TYPED
 from shaftwork.pipeline.arguments import (
+    as_names,
     checked_parameter,
     checked_parameters,
     range_of,
@@ -266,13 +267,13 @@ def _unknowns(model: Model, ranges: Mapping[str, Range], start: Mapping[str, flo
     return _Unknowns(scaling, units, *map(scaling.unknowns, sides))
 
 
-def _names(unknowns: Any) -> list[str]:
+def _names(unknowns: Any) -> tuple[str, ...]:
     """Those of the unknowns.
 
     Raises:
         ParameterError: there is none, or one is named twice.
     """
-    listed = [unknowns] if isinstance(unknowns, str) else [str(name) for name in unknowns]
+    listed = as_names(unknowns)
     if not listed:
         raise ParameterError("Nothing is unknown. Name what to fit, such as ['shaft.c', 'shaft.d'].")
     if twice := repeated(listed):
@@ -340,6 +341,8 @@ def _deviations(sigma: Any, names: Sequence[str]) -> Array | None:
 def _priors(priors: Mapping[str, tuple[float, float]] | None, scale: Scaling) -> tuple[Array, Array]:
     """(m,) values expected of the scaled unknowns, and their standard deviations; NaN where nothing is."""
     values, deviations = np.full((2, len(scale.names)), np.nan)
+    if not isinstance(priors, Mapping | None):
+        raise ParameterError(f"priors = {priors!r} must map unknowns to (value, standard deviation).")
     for name, prior in (priors or {}).items():
         if not (isinstance(prior, Sequence) and not isinstance(prior, str) and len(prior) == 2):
             raise ParameterError(f"The prior of '{name}' must be (value, standard deviation), not {prior!r}.")

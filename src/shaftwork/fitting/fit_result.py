@@ -248,7 +248,7 @@ class Fit:
         ]
         for spread, shares in self.unseen:
             words = ", ".join(f"{name} {share:+.2f}" for name, share in shares.items())
-            extent = "not at all" if np.isinf(spread) else f"to {100 * spread:.0f} % only"
+            extent = "not at all" if np.isinf(spread) else f"to {100 * spread:.0f} % only" if spread < 10 else "hardly"
             notes.append(f"The record tells this combination {extent}: {words}.")
         notes += [self._told_of_starts()] if self.tried > 1 else []
         notes += [self.caveat] if self.caveat else []

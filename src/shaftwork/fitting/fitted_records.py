@@ -104,9 +104,8 @@ def _one_series(name: str, column: Any, at: Array, domain: str) -> RecordedSerie
     try:
         ordered = values[order].astype(float if domain == "t" else complex)
     except (TypeError, ValueError):
-        raise ParameterError(
-            f"'{name}' holds something else than numbers, {values.ravel()[0]!r} first. Drop the column."
-        ) from None
+        wrong = next((one for one in values.ravel().tolist() if not isinstance(one, complex | float | int)), "")
+        raise ParameterError(f"'{name}' holds something else than numbers, {wrong!r} first. Drop the column.") from None
     there = np.isfinite(ordered)
     if not there.any():
         raise ParameterError(f"'{name}' has no finite value.")

@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.numerics.tolerances import EQUAL, TYPED
 from shaftwork.optimization.measured_motion import MeasuredMotion
-from shaftwork.optimization.optimum import missed
+from shaftwork.optimization.optimum import missed, sizes_of
 from shaftwork.sweep.sweep_result import Limits
 
 FRUITLESS = 30
@@ -66,7 +66,7 @@ class Descent:
         sign: float,
     ) -> None:
         self._motion, self._limits, self._name, self._sign = motion, limits, name, sign
-        self.ranges = ranges
+        self.ranges, self.sizes = ranges, dict[str, float]()
         self._low, self._high = np.array(list(ranges.values())).T
         self._size, self._constraints = 1.0, list[dict[str, Any]]()
         self._tried, self._begun, self._since = set[bytes](), list[Array](), 0
@@ -79,7 +79,8 @@ class Descent:
         Args:
             start: variables, at which every goal has a finite value.
         """
-        self._constraints = list(self._sides(self._values(start)))
+        self.sizes = sizes_of(self._limits, first := self._values(start))
+        self._constraints = list(self._sides(first))
         end = self._once(start)
         for _ in range(RESTARTS):
             if (place := self._anew(end)) is None:
@@ -98,12 +99,15 @@ class Descent:
             return best
         moved = np.abs(end.variables - self._begun[-1]) > EQUAL * (self._high - self._low)
         finer = self._size_at(end.variables) < 0.5 * self._size
-        return end.variables if finer and moved.any() and not missed(self._limits, values) else None
+        return end.variables if finer and moved.any() and not self._missed(values) else None
 
     def _gained(self, before: Array, after: Array) -> bool:
         """Whether a design is plainly better than another one, and meets the limits."""
         goals, goal = self._values(after), self._values(before)[self._name]
-        return self._sign * (goal - goals[self._name]) > EQUAL * self._size and not missed(self._limits, goals)
+        return self._sign * (goal - goals[self._name]) > EQUAL * self._size and not self._missed(goals)
+
+    def _missed(self, goals: Mapping[str, float]) -> dict[str, float]:
+        return missed(self._limits, goals, self.sizes)
 
     def _size_at(self, variables: Array) -> float:
         """That of the goal; one that passes through zero there is as large as it becomes in a thousandth of a range."""
@@ -183,7 +187,7 @@ class Descent:
     def _judge(self, variables: Array, goals: Mapping[str, float]) -> None:
         self._since += 1
         if all(map(np.isfinite, goals.values())):
-            miss = max(missed(self._limits, goals).values(), default=0.0)
+            miss = max(self._missed(goals).values(), default=0.0)
             goal = self._sign * goals[self._name]
             met, gain = any(not other for other, _, _ in self._better), TYPED * self._size
             if all(miss < other - EQUAL or (met and goal < best - gain) for other, best, _ in self._better):

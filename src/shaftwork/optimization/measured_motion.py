@@ -11,6 +11,7 @@ from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import NetworkError, ParameterError, SimulationError, in_one_line
 from shaftwork.numerics.differences import differences
 from shaftwork.optimization.optimum import in_words
+from shaftwork.pipeline.arguments import closer
 from shaftwork.pipeline.network import Network
 from shaftwork.pipeline.settled import steady_start
 from shaftwork.results.measures import Measure
@@ -62,7 +63,7 @@ class MeasuredMotion:
         self._known = dict[bytes, dict[str, tuple[float, Array]]]()
         """What was computed so far, by variables: a descent comes back to its best design."""
         self._failures = dict[bytes, str]()
-        """Why there is no motion, by variables."""
+        """Why there is no motion or no number of a function, by variables."""
         self.motions = 0
         """How many were computed."""
 
@@ -80,7 +81,7 @@ class MeasuredMotion:
         """Which goal has no finite value and why; empty where all have one."""
         goals = {name: value for name, (value, _) in self.at(variables).items() if not np.isfinite(value)}
         if goals and (failure := self._failures.get(variables.tobytes())):
-            return f"there is no motion ({failure})"
+            return failure
         return next((f"{name} is {value:g}" for name, value in goals.items()), "")
 
     def _computed(self, variables: Array) -> dict[str, tuple[float, Array]]:
@@ -90,11 +91,15 @@ class MeasuredMotion:
             try:
                 results = self._measures(values)
             except (SimulationError, NetworkError) as error:
-                self._failures[variables.tobytes()] = in_one_line(error).rstrip(".")
+                self._failures[variables.tobytes()] = f"there is no motion ({in_one_line(error).rstrip('.')})"
                 results = {name: (np.nan, np.zeros(variables.size)) for name in self._read}
         for name, goal in self._goals.items():
             if not isinstance(goal, str):
-                results[name] = self._of_parameters(name, goal, variables)
+                try:
+                    results[name] = self._of_parameters(name, goal, variables)
+                except SimulationError as error:
+                    self._failures[variables.tobytes()] = in_one_line(error).rstrip(".")
+                    results[name] = np.nan, np.zeros(variables.size)
         return results
 
     def _measures(self, values: Mapping[str, float]) -> dict[str, tuple[float, Array]]:
@@ -110,7 +115,7 @@ class MeasuredMotion:
 
     def _from_steady(self, values: Mapping[str, float]) -> Solution:
         initial = steady_start(self._model, self._initial or {}, values)
-        rtol = max(1e-2 * self._rtol, 1e-13)  # no engine takes less
+        rtol = closer(self._rtol)
         return self._model.simulate(self._t_end, initial=initial, parameters=values, rtol=rtol, t_eval="steps")
 
     def _by_differences(self, solution: Solution, values: Mapping[str, float]) -> dict[str, tuple[float, Array]]:
@@ -135,11 +140,16 @@ class MeasuredMotion:
 
         Raises:
             ParameterError: it gives no number.
-            SimulationError: it is finite here, but on neither side.
+            SimulationError: it fails, or is finite here, but on neither side.
         """
 
         def value(at: Array) -> float:
-            result: Any = goal({**self._fixed, **self.values(at)})
+            try:
+                result: Any = goal({**self._fixed, **self.values(at)})
+            except Exception as error:  # of the user's own function: a reason, not the end of all starts
+                raise SimulationError(
+                    f"the function '{name}' raises {type(error).__name__}: {in_one_line(error)}"
+                ) from error
             try:
                 return float(1.0 * result)  # a product, as float alone reads texts
             except TypeError:

@@ -25,7 +25,7 @@ from shaftwork.pipeline.arguments import (
     start_count,
     time_span,
 )
-from shaftwork.pipeline.measured_units import units_of
+from shaftwork.pipeline.measured_units import parameter_units, units_of
 from shaftwork.pipeline.motion_start import refuse_motion
 from shaftwork.pipeline.network import Network, network_of, with_values
 from shaftwork.results.measures import Measure
@@ -76,20 +76,14 @@ def optimize(
 
     Raises:
         ParameterError: an argument is out of its range, or a measure has no derivative.
-        SimulationError: there is no motion at a start.
+        SimulationError: the network itself has no motion; a start without one is among `Optimum.attempts`.
     """
     ranges = _ranges(net, variables)
     starts, seed = start_count(starts), seed_number(seed)
-    if OBJECTIVE in (functions or {}):
-        raise ParameterError(f"'{OBJECTIVE}' is the name of the goal. Give the function another one.")
     refuse_motion(initial, "optimize")
-    limits = limits_of(require or {}, partial(_unit, net, functions or {}))
-    if unused := [other for other in functions or {} if other not in limits]:
-        raise ParameterError(
-            f"'{unused[0]}' is a function without limits. Give require={{'{unused[0]}': (low, high)}}."
-        )
-    name = goal if isinstance(goal, str) else OBJECTIVE
-    goals = {name: goal, **{other: (functions or {}).get(other, other) for other in limits}}
+    name, goals = _goals(goal, functions or {}, require or {})
+    units = units_of(net, {other: Measure.read(text) for other, text in goals.items() if isinstance(text, str)})
+    limits = limits_of(require or {}, units.get)
     _, end = time_span(0.0, t_end)
     taken = _combinations(choices, ranges)
     attempts: list[Attempt] = []
@@ -101,12 +95,27 @@ def optimize(
                 descent = Descent(motion, ranges, limits, name, -1.0 if maximize else 1.0)
                 attempts.append(_attempt(motion, choice, values, start, descent))
                 show(len(attempts), "optimize")
-    return Optimum(net, name, maximize, limits, tuple(attempts))
+    units |= parameter_units(net, attempts[0].values)
+    return Optimum(net, name, maximize, limits, tuple(attempts), units)
 
 
-def _unit(net: Network, functions: Mapping[str, Goal], name: str) -> str | None:
-    """That of a measure; None of a function."""
-    return None if name in functions else units_of(net, {name: Measure.read(name)})[name]
+def _goals(goal: Any, functions: Mapping[str, Goal], require: Mapping[str, Any]) -> tuple[str, dict[str, Goal]]:
+    """The name of the goal, and by name the goal and all that is limited.
+
+    Raises:
+        ParameterError: one is neither a measure nor a function, or a function has no limits or the name of the goal.
+    """
+    if not isinstance(goal, str) and not callable(goal):
+        raise ParameterError(f"goal = {goal!r} must be a measure, or a function of all parameters.")
+    for name, function in functions.items():
+        if not callable(function):
+            raise ParameterError(f"functions['{name}'] = {function!r} must be a function of all parameters.")
+        if name == OBJECTIVE:
+            raise ParameterError(f"'{OBJECTIVE}' is the name of the goal. Give the function another one.")
+        if name not in require:
+            raise ParameterError(f"'{name}' is a function without limits. Give require={{'{name}': (low, high)}}.")
+    name = goal if isinstance(goal, str) else OBJECTIVE
+    return name, {name: goal, **{other: functions.get(other, other) for other in require}}
 
 
 def _ranges(net: Network, variables: Any) -> dict[str, tuple[float, float]]:
@@ -121,7 +130,12 @@ def _ranges(net: Network, variables: Any) -> dict[str, tuple[float, float]]:
             "studies.sweep(net, samples={...})."
         )
     netlist, ranges = network_of(net).netlist(), dict[str, tuple[float, float]]()
+    zeros = net.compile().form.graph.zeros
     for name, span in variables.items():
+        if name in zeros:
+            raise ParameterError(
+                f"'{name}' is zero in the network, so it is in no equation. Give it a value there, to start from."
+            )
         low, high = range_of(name, span, partial(checked_parameter, netlist, name))
         if low is None or high is None:
             raise ParameterError(f"'{name}': {span!r} has an open side. Give (low, high).")
@@ -137,6 +151,8 @@ def _combinations(
     Raises:
         ParameterError: a catalogue has no sets of parameters, or one is set twice.
     """
+    if single := [name for name, sets in (choices or {}).items() if not isinstance(sets, Iterable)]:
+        raise ParameterError(f"choices['{single[0]}'] must be a list of sets of values, such as [{{'J1.J': 2.0}}].")
     lists = {name: list(sets) for name, sets in (choices or {}).items()}
     if empty := [name for name, sets in lists.items() if not sets]:
         raise ParameterError(f"There is nothing to choose from in '{empty[0]}'.")
@@ -182,7 +198,7 @@ def _attempt(
     goals = {of: value for of, (value, _) in motion.at(end.variables).items()}
     message, values = motion.undefined(end.variables) or end.message, {**fixed, **motion.values(end.variables)}
     at_ends = tuple(name for name, span in descent.ranges.items() if _ends_at(values[name], span))
-    return Attempt(choice, values, goals, message, end.success, motion.motions - before, at_ends)
+    return Attempt(choice, values, goals, message, end.success, motion.motions - before, descent.sizes, at_ends)
 
 
 def _ends_at(value: float, span: tuple[float, float]) -> bool:

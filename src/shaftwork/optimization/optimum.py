@@ -28,6 +28,7 @@ class Attempt:
         message: why it ended; of one without a finite value of every goal which has none.
         success: whether it ended where the goal is least nearby.
         motions: computed for it.
+        sizes: of the limited goals, by which it is judged how far a limit is missed.
         at_ends: the variables that ended at an end of their range.
     """
 
@@ -37,6 +38,7 @@ class Attempt:
     message: str
     success: bool
     motions: int
+    sizes: Mapping[str, float]
     at_ends: tuple[str, ...] = ()
 
     @property
@@ -55,6 +57,7 @@ class Optimum:
         maximize: whether largest.
         require: limits by goal.
         attempts: all descents.
+        units: of parameters and goals by name, SI; not of functions, whose units are not known.
     """
 
     network: Network
@@ -62,10 +65,11 @@ class Optimum:
     maximize: bool
     require: Mapping[str, Limits]
     attempts: tuple[Attempt, ...]
+    units: Mapping[str, str]
 
     def meets(self, attempt: Attempt) -> bool:
         """Whether a design is within all limits, to a millionth of their size."""
-        return attempt.complete and not missed(self.require, attempt.goals)
+        return attempt.complete and not missed(self.require, attempt.goals, attempt.sizes)
 
     @cached_property
     def best(self) -> Attempt:
@@ -89,10 +93,10 @@ class Optimum:
                 f"None of {count} has a design with all goals: {undefined[0]}. Give functions that are numbers in the "
                 "whole ranges, narrower ranges, or more starts."
             )
-        nearest = min(complete, key=lambda a: max(missed(self.require, a.goals).values()))
+        nearest = min(complete, key=lambda a: max(missed(self.require, a.goals, a.sizes).values()))
         misses = "; ".join(
             f"{name} must be {self._limits(name)} and is {nearest.goals[name]:.6g}"
-            for name in missed(self.require, nearest.goals)
+            for name in missed(self.require, nearest.goals, nearest.sizes)
         )
         said = "; ".join([f"the nearest has {in_words(nearest.values)}, where {misses}", *undefined])
         return f"None of {count} meets all limits: {said}. Widen a range or a limit, or take more starts."
@@ -114,11 +118,12 @@ class Optimum:
             f"{counted(len(self.attempts), 'descent')} and {sum(a.motions for a in self.attempts)} motions"
         )
         ends = dict.fromkeys(best.at_ends, "an end of its range")
-        rows = [[name, f"{value:.6g}", ends.get(name, "")] for name, value in best.values.items()]
-        rows += [[name, f"{value:.6g}", self._said(name)] for name, value in best.goals.items()]
-        rows += [[name, f"number {number}", "chosen"] for name, number in best.choice.items()]
-        rows += [] if best.success else [["no minimum yet", "", best.message]]
-        return title, ["", "best", ""], rows
+        numbers = [(name, value, ends.get(name, "")) for name, value in best.values.items()]
+        numbers += [(name, value, self._said(name)) for name, value in best.goals.items()]
+        rows = [[name, f"{value:.6g}", self.units.get(name, ""), said] for name, value, said in numbers]
+        rows += [[name, f"number {number}", "", "chosen"] for name, number in best.choice.items()]
+        rows += [] if best.success else [["no minimum yet", "", "", best.message]]
+        return title, ["", "best", "unit", ""], rows
 
     def _said(self, name: str) -> str:
         return self._limits(name) if name in self.require else "goal"
@@ -129,21 +134,26 @@ class Optimum:
         return " and ".join([*words, *([f"at most {high:g}"] if high is not None else [])])
 
     def __str__(self) -> str:
-        title, _, rows = self._rows()
-        return "\n".join([title, *in_columns(rows, (1,))])
+        title, header, rows = self._rows()
+        return "\n".join([title, *in_columns([header, *rows], (1,))])
 
     def _repr_html_(self) -> str:
         return html_table(*self._rows())
 
 
-def missed(require: Mapping[str, Limits], goals: Mapping[str, float]) -> dict[str, float]:
+def sizes_of(require: Mapping[str, Limits], first: Mapping[str, float]) -> dict[str, float]:
+    """The size of each limited goal: of its limits, or where these are zero of its value at the start."""
+    ends = {name: [abs(end) for end in limits if end is not None] for name, limits in require.items()}
+    return {name: max(sizes, default=0.0) or abs(first[name]) or 1.0 for name, sizes in ends.items()}
+
+
+def missed(require: Mapping[str, Limits], goals: Mapping[str, float], sizes: Mapping[str, float]) -> dict[str, float]:
     """By how much a limit is missed, in its size, by goal; the worst first, and none that is met to a millionth."""
     misses = dict[str, float]()
     for name, (low, high) in require.items():
         beyond = max(0.0 if low is None else low - goals[name], 0.0 if high is None else goals[name] - high)
-        size = max((abs(end) for end in (low, high) if end is not None), default=0.0)
-        if beyond > EQUAL * size:
-            misses[name] = beyond / (size or 1.0)
+        if beyond > EQUAL * sizes[name]:
+            misses[name] = beyond / sizes[name]
     return dict(sorted(misses.items(), key=itemgetter(1), reverse=True))
 
 

@@ -99,7 +99,7 @@ def as_names(names: str | Sequence[str]) -> tuple[str, ...]:
     """
     listed = (names,) if isinstance(names, str) else tuple(names) if isinstance(names, Iterable) else (names,)
     if wrong := [name for name in listed if not isinstance(name, str)]:
-        raise ParameterError(f"{wrong[0]!r} is no name. Give the names of parts as texts: ['J1', 'shaft'].")
+        raise ParameterError(f"{wrong[0]!r} is no name. Give names as texts, such as ['J1', 'shaft'].")
     return listed
 
 
@@ -128,6 +128,11 @@ def relative_tolerance(rtol: Any) -> float:
             "1e-8 is a good choice, and no engine gains much below 1e-13."
         )
     return value
+
+
+def closer(rtol: float) -> float:
+    """A hundredth of a relative tolerance: that of a motion with such derivatives; no engine gains below 1e-13."""
+    return max(1e-2 * rtol, 1e-13)
 
 
 def step_limit(max_steps: Any) -> int:

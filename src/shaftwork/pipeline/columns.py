@@ -34,6 +34,8 @@ def column_in_si(name: str, values: Any, checked: Checked, *, rows: bool = False
     if not has_many(values):
         raise ParameterError(f"'{name}': {values!r} must be a sequence of values. Write [{values!r}].")
     values = values.to_numpy() if hasattr(values, "to_numpy") else values
+    if np.ma.is_masked(values):
+        raise ParameterError(f"'{name}' has values that are masked. Leave their rows out.")
     if not isinstance(values, np.ndarray):
         values = list(values)
         values = np.array(values) if all(type(value) is float for value in values) else values

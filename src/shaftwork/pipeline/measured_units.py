@@ -1,8 +1,8 @@
-"""Units of measures of a motion, in which limits are given."""
+"""Units of parameters, and of measures of a motion, in which limits are given."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from shaftwork.codegen.model_observer import ModelObserver
@@ -35,6 +35,13 @@ def units_of(net: Network, measures: Mapping[str, Any]) -> dict[str, str]:
 def _along(observer: ModelObserver) -> dict[str, str]:
     """Units of quantities along parts."""
     return {name: unit for name, (unit, _) in observer.profiles.items()}
+
+
+def parameter_units(net: Network, names: Iterable[str]) -> dict[str, str]:
+    """Units of parameters "part.name" that there are, by name."""
+    parts = {placed.part.name: placed.part for placed in net.netlist().placed}
+    split = ((name, *name.rpartition(".")) for name in names)
+    return {name: parts[owner].declared[parameter].unit for name, owner, _, parameter in split}
 
 
 def limits_in_si(name: str, limits: Any, unit: str | None) -> Any:

@@ -50,6 +50,11 @@ def plain(text: str) -> str:
     return text.replace("$", r"\$")
 
 
+def label(name: str, unit: str, between: str = " ") -> str:
+    """A name with its unit for an axis; of a pure number, or where the unit is not known, the name alone."""
+    return plain(name if unit in ("", "1") else f"{name}{between}in {unit}")
+
+
 def plot_signals(
     reader: Reader, names: tuple[str, ...], phases: Sequence[PhaseRow], events: Sequence[tuple[float, str, str, str]]
 ) -> Figure:

@@ -10,7 +10,7 @@ import numpy as np
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import ParameterError, SignalError
 from shaftwork.formulation.sampling_instants import refuse_sampled
-from shaftwork.pipeline.arguments import Given, as_names, relative_tolerance
+from shaftwork.pipeline.arguments import Given, as_names, closer, relative_tolerance
 from shaftwork.pipeline.model import Model
 from shaftwork.pipeline.motion_start import refuse_motion
 from shaftwork.pipeline.network import Network, network_of
@@ -53,7 +53,7 @@ class ParametricMotion:
         starts: Sequence[str] = (),
         values: Mapping[str, float] | None = None,
     ) -> None:
-        self.model, self._span, self._starts = model, span, tuple(starts)
+        self.model, self._span, self._starts = model, span, tuple(dict.fromkeys(starts))
         refuse_sampled(self.model.form, "its derivatives by parameters are not followed from instant to instant")
         refuse_motion(initial, "motion_sensitivities")
         self._rtol = relative_tolerance(rtol)
@@ -73,12 +73,12 @@ class ParametricMotion:
         names = without_start(self.model, names, self._initial, span, are_asked=parameters is not None)
         self.parameters = {
             **{name: (values or {}).get(name, self.model.parameters[name]) for name in names},
-            **{name: self._initial[name] for name in starts},
+            **{name: self._initial[name] for name in self._starts},
         }
         """These values, and behind them start values, in SI."""
         if unknown := [name for name in quantities if name not in self.nominal.solution]:
             _ = self.nominal.solution[unknown[0]]  # raises, with what there is
-        self._equations = DifferentiatedEquations(names, starts, quantities, integrands)
+        self._equations = DifferentiatedEquations(names, self._starts, quantities, integrands)
         self._first = self._at_start()
 
     def motion(self, values: Mapping[str, float], share: float = 1.0) -> DifferentiatedMotion:
@@ -93,9 +93,8 @@ class ParametricMotion:
         """
         initial = {**self._initial, **{name: values[name] for name in self._starts if name in values}}
         values = {name: value for name, value in values.items() if name not in self._starts}
-        # No engine takes a tolerance below 1e-13.
         span = self._span[0], self._span[0] + share * (self._span[1] - self._span[0])
-        return motion_of(self.model, span, initial or None, max(1e-2 * self._rtol, 1e-13), values)
+        return motion_of(self.model, span, initial or None, closer(self._rtol), values)
 
     def slopes(self, motion: DifferentiatedMotion, values: Mapping[str, float]) -> MotionSlopes:
         """The derivatives of the motion for some values, by the parameters and start values.
@@ -171,8 +170,12 @@ def trajectory_sensitivities(
         SimulationError: there is no derivative, see `motion_sensitivities`.
     """
     times = array_in_si("t", t, "s")
-    if not (times.size and np.isfinite(times).all() and times[0] >= 0.0 and (np.diff(times) >= 0.0).all()):
-        raise ParameterError("t must be times in s that ascend from zero or later, such as np.linspace(0.0, 1.0, 101).")
+    if not (
+        times.size and np.isfinite(times).all() and times[0] >= 0.0 and (np.diff(times) >= 0.0).all() and times[-1]
+    ):
+        raise ParameterError(
+            "t must be times in s that ascend from zero or later, and end later, such as np.linspace(0.0, 1.0, 101)."
+        )
     names = as_names(quantities)
     if not names:
         raise SignalError("No quantity is named. Give names such as 'shaft.tau'.")

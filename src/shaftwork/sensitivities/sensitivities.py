@@ -49,7 +49,7 @@ def frequency_sensitivities(
     model = network_of(net).compile()
     refuse_sampled(model.form, "it has no frequencies")
     equations, p, time, x, _ = model.point({}, at, t)
-    names = smooth_parameters(model, _listed(parameters), ((model, model.defaults), (equations, p)))
+    names = smooth_parameters(model, parameters, ((model, model.defaults), (equations, p)))
     rows = rows_of(equations)
     jacobian = SlopeMatrix(rows, rows.rates, rows.states)
     matrix = jacobian(time, x, p)
@@ -129,7 +129,7 @@ def motion_sensitivities(
     integrands = dict.fromkeys(item for measure in read.values() if (item := integrand(measure)) is not None)
     quantities = dict.fromkeys(measure.quantity for measure in read.values())
     model, span = network_of(net).compile(), time_span(0.0, t_end)
-    motion = ParametricMotion(model, tuple(quantities), tuple(integrands), _listed(parameters), span, initial, rtol)
+    motion = ParametricMotion(model, tuple(quantities), tuple(integrands), parameters, span, initial, rtol)
     solution, slopes = motion.nominal.solution, motion.slopes(motion.nominal, {})
     integrals = dict(zip(integrands, slopes.integrals(), strict=True))
     results = {name: measured(item, solution, slopes, integrals) for name, item in read.items()}
@@ -150,10 +150,6 @@ def _measures(measures: Mapping[str, str] | Sequence[str]) -> dict[str, Measure]
             "nothing here knows the derivative. Take differences of two runs."
         )
     return {name: Measure.read(text) for name, text in named.items()}
-
-
-def _listed(names: Sequence[str] | None) -> Sequence[str] | None:
-    return (names,) if isinstance(names, str) else names
 
 
 def integrand(measure: Measure) -> tuple[str, int] | None:

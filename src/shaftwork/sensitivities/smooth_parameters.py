@@ -15,7 +15,7 @@ from shaftwork.components.laws import t as TIME
 from shaftwork.components.noise import HeldNoise, SmoothNoise
 from shaftwork.core.errors import ParameterError
 from shaftwork.numerics.tolerances import TYPED
-from shaftwork.pipeline.arguments import Given
+from shaftwork.pipeline.arguments import Given, as_names
 from shaftwork.pipeline.model import Model
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ NO_DERIVATIVE = {
 
 def smooth_parameters(
     model: Model,
-    names: Sequence[str] | None,
+    names: str | Sequence[str] | None,
     used: Iterable[tuple[CompiledModel, Array]],
     span: tuple[float, float] | None = None,
 ) -> tuple[str, ...]:
@@ -62,12 +62,13 @@ def smooth_parameters(
             reasons |= dict.fromkeys(_at_edges(one, p, span), "edge")
     if names is None:
         return tuple(name for name in numbers if name not in reasons)
-    for name in names:
+    asked = tuple(dict.fromkeys(as_names(names)))
+    for name in asked:
         if name in reasons:
             raise ParameterError(f"'{name}' {NO_DERIVATIVE[reasons[name]]}")
         if name not in numbers:
             raise ParameterError(f"There is no parameter '{name}' with a number. There are: {', '.join(numbers)}.")
-    return tuple(names)
+    return asked
 
 
 def _seeds(model: CompiledModel) -> Iterator[str]:

@@ -27,7 +27,8 @@ from shaftwork.sweep.lane_step import STAGES, ControlledQuantity, StepWriter
 from shaftwork.sweep.lane_tables import LaneCourse, LaneEnd, LaneRow, Met
 
 OF_A_STEP, LOOSEST_TOLERANCE, TIGHTEST_TOLERANCE = 0.1, 1e-7, 1e-13
-"""The tolerance of a step as a part of that of the motion, and its bounds."""
+"""The tolerance of a step as a part of that of the motion, since errors add up, and its bounds: what is measured inside
+looser steps is off by more than their ends are, and tighter ones are rounding."""
 
 
 class LaneProgram:

@@ -58,8 +58,8 @@ class StepWriter:
         states: how many there are; the integrals follow them, as quantities and powers.
         integrals: which of the controlled quantities is integrated, and to which power.
         controlled: quantities.
-        signs: of each quantity whose largest value is wanted; jets of these come first among the monitored values,
-        guards: and then those of so many guards.
+        signs: of each quantity whose largest value is wanted; their jets come first among the monitored values.
+        guards: how many there are; their jets come behind these.
     """
 
     def __init__(

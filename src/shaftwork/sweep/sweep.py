@@ -25,12 +25,13 @@ from shaftwork.pipeline.arguments import (
     by_name,
     checked_parameter,
     engine_names,
+    output_times,
     relative_tolerance,
     repeated,
     time_span,
 )
 from shaftwork.pipeline.columns import column_in_si
-from shaftwork.pipeline.measured_units import units_of
+from shaftwork.pipeline.measured_units import parameter_units, units_of
 from shaftwork.pipeline.motion_start import ending_of, refuse_motion, time_of_start
 from shaftwork.pipeline.network import Network, network_of
 from shaftwork.results.fatigue import SNLine
@@ -84,7 +85,7 @@ def sweep(
         require: by measure, (low, high), numbers in its SI unit or quantities; None leaves a side open.
         sn: S-N line for measures of damage, or one by quantity.
         rtol: relative tolerance of a step; the absolute one beside it is `rtol` times the size of a state at a speed of
-            0.001 rad/s.
+            0.001 rad/s. Side by side a tenth of it, and never more than 1e-7: what is looser costs the same.
         engine: as in `Model.simulate`; one that is named follows each variant by itself.
         initial: start values, or a motion that each variant goes on from, as there.
         steady: whether each variant starts in its own steady state at t = 0, of which `initial` changes some values.
@@ -93,7 +94,8 @@ def sweep(
         on: "gpu" for the first graphics processor that JAX sees (extra `gpu`), or a device of JAX: variants run side by
             side there. Or a client of Dask, `distributed.Client(...)`, whose workers do all of it (extra `cluster`).
         precision: of numbers on a graphics processor. In "single", `Sweep.errors` says how far results are off.
-        store: a file to which all that is done is written. The same call with the same file goes on where it stopped.
+        store: a file to which all that is done is written. The same call with the same file goes on where it stopped;
+            functions that measure are known in it by their names.
 
     Raises:
         ParameterError: an argument is out of its range, there is no such parameter, measure or device, or the store is
@@ -104,9 +106,10 @@ def sweep(
     columns = _columns(network_of(net).netlist(), parameters, samples)
     start = _start(net, initial, steady=steady)
     readers = _readers(measures, columns)
-    units = units_of(net, readers)
+    units = {**parameter_units(net, columns), **units_of(net, readers)}
     limits = _limits(require, readers, units)
     _, end = time_span(time_of_start(None, start), t_end)
+    output_times(t_eval, time_of_start(None, start), end)  # said once, not of every variant
     options = _options(readers, rtol, engine, start, t_eval)
     device = _device(on, precision)
     told = "" if device is None else precision
@@ -171,9 +174,11 @@ def _options(
 
 def _count(processes: int | None) -> int | None:
     """How many processes; None for as many as there are cores."""
-    if processes is not None and (count := whole(processes)) is None:
+    if processes is None:
+        return None
+    if (count := whole(processes)) is None:
         raise ParameterError(f"processes = {processes!r} must be a number, 1 or more; leave it out for all cores.")
-    return None if processes is None else count
+    return count
 
 
 def _run(

@@ -19,7 +19,7 @@ from shaftwork.core.parameters import is_quantity, whole
 from shaftwork.core.screen import ROWS, counted, in_columns
 from shaftwork.pipeline.measured_units import limits_in_si
 from shaftwork.results.observer import Array
-from shaftwork.results.plotting import new_figure
+from shaftwork.results.plotting import label, new_figure
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -82,7 +82,7 @@ class Sweep:
         why: why variants ran one by one, and how many, where some did; empty where all ran side by side.
         errors: in single precision, by measure, how far 16 variants all over the sweep differ from double precision at
             most, as a part of the largest value of these; else empty.
-        units: by measure, SI; not of functions, whose units are not known.
+        units: by parameter and measure, SI; not of functions, whose units are not known.
     """
 
     name: str
@@ -194,6 +194,8 @@ class Sweep:
     def plot(self, *names: str) -> Figure:
         """Parallel coordinates: a line for each variant, through its parameters and measures (extra `plot`).
 
+        Of more than 2000 variants, as many lines as can be told apart, those that are spread evenly over all are shown.
+
         Args:
             *names: of the columns; by default all.
 
@@ -204,7 +206,7 @@ class Sweep:
         return _parallel_coordinates(self, names)
 
     def _rows(self, count: int) -> tuple[str, list[str], list[list[str]]]:
-        """What is said of all variants, and headings and cells of the first ones."""
+        """What is said of all variants, headings, and cells: units, and below them the first variants."""
         columns, passed, why = {**self.parameters, **self.measures}, self.passed, self._verdicts
         rows = [
             [
@@ -220,6 +222,9 @@ class Sweep:
         if self.errors:
             parts = ", ".join(f"{name} {error:.0e}" for name, error in self.errors.items())
             counts = f"{counts}; off by single precision: {parts}"
+        units = [self.units.get(name, "") for name in columns]
+        if any(units):
+            rows.insert(0, ["", *units, "", ""])
         return counts, ["", *columns, "passed", "reason" if any(why) else ""], rows
 
     def __str__(self) -> str:
@@ -241,9 +246,10 @@ def _parallel_coordinates(sweep: Sweep, names: tuple[str, ...]) -> Figure:
     figure = new_figure("Sweep.plot()", 2.2 * max(len(shown), 2), 4.8)
     from matplotlib.collections import LineCollection
 
-    rows = np.flatnonzero(~sweep.failed)[:2000]  # more lines would hide each other
-    low = {name: float(columns[name][rows].min(initial=np.inf)) for name in shown} if rows.size else {}
-    size = {name: (float(columns[name][rows].max()) - low[name]) or 1.0 for name in low}
+    good = np.flatnonzero(~sweep.failed)
+    rows = good[np.unique(np.linspace(0, good.size - 1, 2000).round().astype(int))] if good.size else good
+    low = {name: float(columns[name][good].min()) for name in shown} if good.size else {}
+    size = {name: (float(columns[name][good].max()) - low[name]) or 1.0 for name in low}
     axes = figure.subplots()
     shares = [(columns[name][rows] - low[name]) / size[name] for name in low]
     lines = np.array([list(enumerate(heights)) for heights in zip(*shares, strict=True)])
@@ -263,7 +269,9 @@ def _parallel_coordinates(sweep: Sweep, names: tuple[str, ...]) -> Figure:
                 axes.plot([k - 0.08, k + 0.08], [(limit - low[name]) / size[name]] * 2, color="tab:red", zorder=4)
     axes.set_xlim(-0.2, len(shown) - 0.5)
     axes.set_ylim(-0.05, 1.05)
-    axes.set_xticks(range(len(shown)), shown, fontsize=8)
+    axes.set_xticks(range(len(shown)), [label(name, sweep.units.get(name, ""), "\n") for name in shown], fontsize=8)
     axes.set_yticks([])
-    axes.set_title(f"{sweep.name}: {len(sweep)} variants, {int(sweep.passed.sum())} meet the requirements", fontsize=10)
+    some = f", {rows.size} of them shown" if rows.size < good.size else ""
+    title = f"{sweep.name}: {len(sweep)} variants, {int(sweep.passed.sum())} meet the requirements{some}"
+    axes.set_title(title, fontsize=10)
     return figure

@@ -209,14 +209,22 @@ def _laws(network: Network) -> str:
 
 
 def _measures(readers: Mapping[str, Reader]) -> str:
-    """Names and what is read; of a function its own name, since no text tells what it does."""
-    return repr(
-        {name: str(reader) if isinstance(reader, Measure) else _named(reader) for name, reader in readers.items()}
-    )
+    """Names and what is read; of a function its own name, since no text tells what it does.
+
+    Raises:
+        ParameterError: a function has none.
+    """
+    names = {name: str(reader) if isinstance(reader, Measure) else _named(reader) for name, reader in readers.items()}
+    if unclear := [name for name, text in names.items() if "<lambda>" in text or " at 0x" in text]:
+        raise ParameterError(
+            f"store: measure '{unclear[0]}' is a lambda, or has no name that stays the same, so the file cannot tell "
+            "it from another one. Define a function with a name."
+        )
+    return repr(names)
 
 
 def _named(function: Any) -> str:
     """The name of a function, with what a `functools.partial` gives to it."""
     if isinstance(function, partial):
         return f"{_named(function.func)} {function.args} {function.keywords}"
-    return str(getattr(function, "__qualname__", type(function).__name__))
+    return str(getattr(function, "__qualname__", repr(function)))

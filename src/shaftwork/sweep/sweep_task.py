@@ -34,6 +34,8 @@ from shaftwork.core.errors import (
     no_quantity,
 )
 from shaftwork.core.notices import muted
+from shaftwork.core.parameters import in_si
+from shaftwork.core.storing import is_found_elsewhere
 from shaftwork.integrate.engines import available
 from shaftwork.network.netlist import Netlist
 from shaftwork.pipeline.model import Model
@@ -85,7 +87,7 @@ class Task:
         return len(next(iter(self.columns.values())))
 
     def values(self, variant: int) -> dict[str, float]:
-        """The parameters of a variant that differ from the network's."""
+        """The parameters of a variant."""
         return {name: float(column[variant]) for name, column in self.columns.items()}
 
     def rows(self, variants: Any) -> dict[str, Array]:
@@ -121,14 +123,14 @@ class Worker:
 
     Raises:
         NetworkError: the network cannot be assembled.
-        ParameterError: the start values are no mapping.
+        ParameterError: the start values are no mapping, or one is not finite or of another unit.
         SignalError: a start value is of a quantity that does not exist.
     """
 
     def __init__(self, task: Task, device: Device | None = None) -> None:
         self._task, self._model, self._device = task, task.network.compile(), device
         self._netlist: Netlist = task.network.netlist()
-        self._refuse_unknown()
+        self._check_start()
         self.why = ""
         """Why variants run one by one."""
         self._ensemble = self._side_by_side()
@@ -138,14 +140,16 @@ class Worker:
         """Variants in chunks, of which each that is done is stored."""
         return paced(variants, self.chunk) if self._device is None else iter(parted(variants, self.chunk))
 
-    def _refuse_unknown(self) -> None:
+    def _check_start(self) -> None:
         observer = ModelObserver(self._model.form, self._model.bind)
         initial = self._task.options["initial"] or {}
         if not isinstance(initial, Mapping):
             raise ParameterError(f"initial = {initial!r} must map quantities to values, such as {{'J1.omega': 3.0}}.")
-        for quantity in () if isinstance(initial, Ending) else map(str, initial):
-            if quantity not in {**observer.units, **observer.profiles}:
-                raise no_quantity(quantity, self._model.name, observer.units)
+        units = {**observer.units, **{name: unit for name, (unit, _) in observer.profiles.items()}}
+        for name, value in () if isinstance(initial, Ending) else initial.items():
+            if str(name) not in units:
+                raise no_quantity(name, self._model.name, observer.units)
+            in_si(f"the start value of '{name}'", value, units[str(name)])
 
     def _side_by_side(self) -> Ensemble | None:
         task, options = self._task, self._task.options
@@ -288,17 +292,17 @@ def chunks(worker: Worker, task: Task, variants: Index, processes: int | None) -
             left takes long enough, others also where so many are asked for.
 
     Raises:
-        ParameterError: a measure cannot be sent to the processes that are asked for.
+        ParameterError: something cannot be sent to the processes that are asked for.
     """
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         sys.exit(1)  # a script without a guard, run again by a process that it has started: the first one says so
-    sendable, count = _can_be_sent(task), processes or cores()
-    if processes is None and not sendable:
+    unsendable, count = _unsendable(task), processes or cores()
+    if processes is None and unsendable:
         count = 1
-    if count > 1 and not sendable:
+    if count > 1 and unsendable:
         raise ParameterError(
-            f"processes = {count}: other processes do not find a measure that is a lambda, or a function inside "
-            "another or of a notebook. Define it in a module, give the name of a measure, or take processes=1."
+            f"processes = {count}: other processes do not find {unsendable}, as it is a lambda, stands inside a "
+            "function, or in a notebook. Define it in a module, or take processes=1."
         )
     if processes is not None and count > 1 and worker.why:
         yield from _in_processes(task, parted(variants, worker.chunk), count)
@@ -330,13 +334,13 @@ def parted(variants: Index, size: int) -> list[Index]:
     return [variants[first : first + size] for first in range(0, variants.size, size)]
 
 
-def _can_be_sent(task: Task) -> bool:
-    """Whether another process finds the functions that measure: those of a notebook or of `python -c` it does not."""
-    functions = [reader for reader in task.measures.values() if not isinstance(reader, Measure)]
-    main = sys.modules["__main__"]
-    here = any(getattr(function, "__module__", "") == "__main__" for function in functions)
-    local = any("<" in getattr(function, "__qualname__", "") for function in functions)
-    return not local and not (here and not hasattr(main, "__file__"))
+def _unsendable(task: Task) -> str:
+    """The first measure, part or value of one that another process does not find; empty where it finds all."""
+    placed = [one.part for one in task.network.netlist().placed]
+    things: dict[str, Any] = {f"the measure '{name}'": reader for name, reader in task.measures.items()}
+    things |= {f"the class of '{part.name}'": type(part) for part in placed}
+    things |= {f"'{part.name}.{name}'": value for part in placed for name, value in part.values.items()}
+    return next((name for name, thing in things.items() if not is_found_elsewhere(thing)), "")
 
 
 def _in_processes(task: Task, parts: Sequence[Index], count: int) -> Iterator[Chunk]:
@@ -386,9 +390,8 @@ def _begin(task: Task) -> None:
 
 def _end_with_parent() -> None:
     """An idle process waits for work, which comes no more once its parent has been killed."""
-    parent = multiprocessing.parent_process()
-    assert parent is not None  # noqa: S101 (a process of a sweep has one)
-    parent.join()
+    if parent := multiprocessing.parent_process():
+        parent.join()
     os._exit(1)
 
 

@@ -18,7 +18,7 @@ from shaftwork.core.screen import counted, in_columns
 from shaftwork.pipeline.arguments import inner_share, seed_number
 from shaftwork.pipeline.network import Network, network_of
 from shaftwork.results.observer import Array, array_in_si
-from shaftwork.results.plotting import new_figure, plain
+from shaftwork.results.plotting import label, new_figure
 from shaftwork.results.solution import Solution
 from shaftwork.sweep.sweep import sweep
 from shaftwork.sweep.sweep_result import Sweep
@@ -99,7 +99,7 @@ class Bands:
         axes.fill_between(self.t, *self.of_mean, color="tab:blue", alpha=0.5, label=f"mean, to {percent}")
         axes.plot(self.t, self.mean, color="tab:blue", linewidth=1)
         axes.set_xlabel("t in s")
-        axes.set_ylabel(plain(f"{self.quantity} in {self.unit}"))
+        axes.set_ylabel(label(self.quantity, self.unit))
         axes.legend(fontsize=8)
         return figure
 
@@ -140,8 +140,11 @@ def bands(
         AccuracyWarning: some samples failed and are missing in the bands; says how many and why the first one did.
     """
     units, times = _units(net, quantity), array_in_si("t", t, "s")
-    if not (times.size and np.isfinite(times).all() and (np.diff(times) > 0.0).all()):
-        raise ParameterError("t must be times in s that ascend, such as np.linspace(0.0, 1.0, 101).")
+    ascends = bool(times.size and np.isfinite(times).all() and (np.diff(times) > 0.0).all())
+    if not (ascends and times[0] >= 0.0 and times[-1]):
+        raise ParameterError("t must be times in s that ascend from zero or later, such as np.linspace(0.0, 1.0, 101).")
+    if taken := [name for name in ("t_end", "t_eval", "measures") if name in options]:
+        raise ParameterError(f"bands has no {taken[0]}: it shows the quantity at the times t. Leave it out.")
     level = inner_share("level", level)
     columns = _columns(distributions_in_si(net, distributions), samples, seed_number(seed))
     if len(next(iter(columns.values()))) < 2:
@@ -170,16 +173,16 @@ def _units(net: Network, quantity: str) -> Mapping[str, str]:
 
 
 class _Course:
-    """A quantity over time, whose values a sweep measures one after the other in the order of time."""
+    """A quantity over time, whose values a sweep measures one after the other."""
 
     def __init__(self) -> None:
-        self._values = np.empty(0)
+        self._last: tuple[Solution, Array] | None = None
 
     def at(self, quantity: str, k: int, motion: Solution) -> float:
         """The value at output time k."""
-        if k == 0:  # the first that is asked of each motion
-            self._values = motion[quantity]
-        return float(self._values[k])
+        if self._last is None or self._last[0] is not motion:
+            self._last = motion, motion[quantity]
+        return float(self._last[1][k])
 
 
 def _good(found: Sweep) -> Sweep:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from shaftwork.core.errors import ParameterError, imported
 from shaftwork.core.parameters import in_si, whole
@@ -54,8 +55,8 @@ def _of_function(name: str, value: Any, _: str) -> float:
 
 
 def _in_si(name: str, given: Any, checked: Checked) -> Distribution:
-    if hasattr(given, "ppf"):
-        return given
+    if hasattr(given, "ppf") or hasattr(given, "icdf"):
+        return _of_scipy(name, given)
     if isinstance(given, tuple):
         ends = [checked(end, "") for end in given]
         if len(ends) == 2 and ends[0] < ends[1]:
@@ -68,6 +69,29 @@ def _in_si(name: str, given: Any, checked: Checked) -> Distribution:
     )
 
 
+def _of_scipy(name: str, given: Any) -> Any:
+    """A distribution of scipy.stats.
+
+    Raises:
+        ParameterError: its parameters are not given, or not admissible.
+    """
+    if isinstance(given, stats.rv_continuous | stats.rv_discrete):
+        raise ParameterError(f"'{name}': {given.name} has no parameters yet. Give them, such as norm(24e3, 500).")
+    with np.errstate(invalid="ignore"):  # of a scale without end
+        middle = _quantiles(given, np.array([0.5]))
+    if not np.isfinite(middle).all():
+        words = getattr(given, "args", ()), getattr(given, "kwds", {})
+        told = f"{given.dist.name}{words}" if hasattr(given, "dist") else repr(given)
+        raise ParameterError(f"'{name}': {told} has no values. Deviations and scales are finite and larger than zero.")
+    return given
+
+
+def _quantiles(distribution: Any, shares: Array) -> Array:
+    """Of a distribution of scipy.stats, which calls them `ppf`, or `icdf` since 1.15."""
+    of = distribution.icdf if hasattr(distribution, "icdf") else distribution.ppf
+    return np.asarray(of(shares), dtype=float)
+
+
 def _values(distribution: Distribution, shares: Array) -> Array:
     """(k,) values at shares (k,) of a distribution, from 0 up to less than 1."""
     if isinstance(distribution, tuple):
@@ -76,7 +100,7 @@ def _values(distribution: Distribution, shares: Array) -> Array:
     if isinstance(distribution, np.ndarray):
         return np.asarray(distribution[np.minimum((shares * distribution.size).astype(int), distribution.size - 1)])
     # a share of exactly 0 may be drawn, where an endless distribution is infinite and a discrete one below its least
-    return np.asarray(distribution.ppf(np.maximum(shares, FINEST_SHARE)), dtype=float)
+    return _quantiles(distribution, np.maximum(shares, FINEST_SHARE))
 
 
 def _levels(name: str, distribution: Distribution, shares: Array) -> Array:

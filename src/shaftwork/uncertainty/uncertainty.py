@@ -65,7 +65,12 @@ def uncertainty(
         return Uncertainty(sweep(net, samples=design.columns, measures=measures, **options), design, level)
     if not callable(net):
         raise ParameterError(f"{net!r} is neither a network nor a function of columns of samples.")
-    results = {str(name): np.asarray(column, dtype=float) for name, column in net(design.columns).items()}
+    if ignored := [*(["measures"] if measures is not None else []), *options]:
+        raise ParameterError(f"{ignored[0]} is for a network; a function gives all its results. Leave it out.")
+    given = net(design.columns)
+    if not (isinstance(given, Mapping) and given):
+        raise ParameterError(f"The function gives {given!r}. It must give columns of results by measure.")
+    results = {str(name): np.asarray(column, dtype=float) for name, column in given.items()}
     rows = len(next(iter(design.columns.values())))
     if wrong := [name for name, column in results.items() if column.shape != (rows,)]:
         raise ParameterError(f"The function gives '{wrong[0]}' another length than the {rows} samples.")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy import stats
 
-from shaftwork.core.errors import AccuracyWarning, ParameterError
+from shaftwork.core.errors import AccuracyWarning, ParameterError, SimulationError
 from shaftwork.core.notebook import html_table
 from shaftwork.core.notices import warn
 from shaftwork.core.parameters import in_si
@@ -17,7 +17,7 @@ from shaftwork.core.screen import counted, in_columns
 from shaftwork.pipeline.arguments import inner_share
 from shaftwork.pipeline.measured_units import limits_in_si
 from shaftwork.results.observer import Array
-from shaftwork.results.plotting import new_figure, plain
+from shaftwork.results.plotting import label, new_figure, plain
 from shaftwork.sweep.sweep_result import Sweep
 from shaftwork.uncertainty.draws import Design
 
@@ -66,7 +66,14 @@ class Uncertainty:
 
         Raises:
             ParameterError: there is no such measure, or the samples of "morris" tell no distribution.
+            SimulationError: all samples failed.
         """
+        values = self._known(measure)
+        if not values.size:
+            raise SimulationError(f"'{measure}' has no values: {self._title}.")
+        return values
+
+    def _known(self, measure: str) -> Array:
         values = self._drawn(measure)
         return values[np.isfinite(values)]
 
@@ -167,15 +174,17 @@ class Uncertainty:
 
     def _rows(self) -> list[list[str]]:
         """Cells of the table of distributions."""
-        shown = [] if self.design.method == "morris" else [name for name in self.measures if self.values(name).size > 1]
+        shown = [] if self.design.method == "morris" else [name for name in self.measures if self._known(name).size > 1]
         if not shown:
             return []
-        errors = self.design.method == "random"
-        rows = [["", "mean", *(["std. error"] if errors else []), "deviation", "2.5 %", "50 %", "97.5 %"]]
+        errors, units = self.design.method == "random", self.sweep.units
+        optional = [*(["unit"] if units else []), "mean", *(["std. error"] if errors else [])]
+        rows = [["", *optional, "deviation", "2.5 %", "50 %", "97.5 %"]]
         for measure in shown:
             mean, error = self.mean(measure)
+            unit = [units.get(measure, "")] if units else []
             numbers = f"{mean:.6g}", *([f"{error:.2g}"] if errors else []), f"{self.values(measure).std(ddof=1):.4g}"
-            rows.append([measure, *numbers, *(f"{value:.6g}" for value in self.quantiles(measure))])
+            rows.append([measure, *unit, *numbers, *(f"{value:.6g}" for value in self.quantiles(measure))])
         return rows
 
     def _shares(self) -> list[list[str]]:
@@ -199,7 +208,11 @@ class Uncertainty:
         return f"{self.sweep.name}: {counted(len(self), 'sample')}, {failed} failed{first}"
 
     def __str__(self) -> str:
-        tables = [in_columns(rows, range(1, len(rows[0]))) for rows in (self._rows(), self._shares()) if rows]
+        tables = [
+            in_columns(rows, range(first, len(rows[0])))
+            for rows, first in ((self._rows(), 2 if self.sweep.units else 1), (self._shares(), 1))
+            if rows
+        ]
         note = [self._unranked] if self._unranked else []
         return "\n".join([self._title, *chain.from_iterable(tables), *note])
 
@@ -224,7 +237,7 @@ class Uncertainty:
         for measure, axes in zip(self.measures, grid, strict=True):
             if has_values:
                 axes[0].hist(self.values(measure), bins="auto", color="tab:blue")
-                axes[0].set_xlabel(plain(measure))
+                axes[0].set_xlabel(label(measure, self.sweep.units.get(measure, "")))
                 axes[0].set_ylabel("samples")
             if has_indices:
                 indices = self.indices(measure)

@@ -341,7 +341,7 @@ def advance(system, places, course, limits, x, atol, rtol, uneven, sizes, ends, 
         tried += 1
         error = _error(system, t, x, new, length, slopes, y, sizes, atol, rtol)
         step = length * _factor(error, before, 10.0 if error < 1 and not shrunk else 1.0)
-        shrunk, before = not error < 1, max(min(error, 1.0), 1e-4)
+        shrunk, before = not error < 1, max(min(error, 1.0), 1e-4) if error < np.inf else 1.0
         if shrunk:
             continue
         reached = stop if last else t + length

@@ -34,17 +34,17 @@ class LaneTask(IntEnum):
     GOES = 2
     """It makes a step."""
     GUARDS = 3
-    """It looks into its last step for guards,"""
+    """It looks into its last step for guards."""
     CLEARS = 4
-    """has found none,"""
+    """It has found no guard there."""
     PEAKS = 5
-    """or looks for peaks."""
+    """It looks into its last step for peaks."""
     RISES = 6
     """It looks for the time at which a guard is met."""
     LANDS = 7
-    """It looks at where it is then,"""
+    """It looks at where it is as a guard is met."""
     PASSES = 8
-    """and just behind that."""
+    """It looks at where it is just behind that."""
 
 
 class TracedStep(StepWriter):
