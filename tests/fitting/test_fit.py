@@ -432,6 +432,8 @@ def test_a_controller_that_samples_is_fitted_by_differences() -> None:
         ({"record": {"t": [0.0, 1.0], "shaft.tau": [1.0]}}, "as many"),
         ({"record": {"t": [-1.0, 1.0], "shaft.tau": [1.0, 2.0]}}, "from zero on"),
         ({"record": {"t": [0.0, 1.0], "shaft.tau": [np.nan, np.nan]}}, "no finite value"),
+        ({"record": {"t": [], "shaft.tau": []}}, "'t' is empty"),
+        ({"record": {"t": [0.0, np.nan], "shaft.tau": [0.0, 1.0]}}, "'t' has no finite value in row 1"),
         ({"record": {"t": [0.0], "shaft.tau": [0.0]}}, r"'shaft\.tau': all values are at t = 0 s"),
         ({"record": {"t": [0.0, 1.0], "shaft.tau": [0.0, np.nan]}}, "Give later ones"),
         ({"record": {"t": [0.0, 1.0], "shaft.tau": [0.0, 1e300]}}, r"'shaft\.tau' has a value of size 1e\+300"),
@@ -455,8 +457,11 @@ def test_a_controller_that_samples_is_fitted_by_differences() -> None:
         ({"sigma": "x"}, "sigma"),
         ({"priors": {"shaft.c": 3.0}}, "must be .value, standard deviation."),
         ({"priors": {"shaft.c": ("a", 1.0)}}, "prior of 'shaft.c'"),
-        ({"record": {"t": [0.0, 1.0], "shaft.tau": ["a", "b"]}}, "something else than numbers, 'a' first"),
-        ({"record": {"t": [0.0, 1.0], "shaft.tau": np.array([1.0, "b"], dtype=object)}}, "than numbers, 'b' first"),
+        (
+            {"record": {"t": [0.0, 1.0], "shaft.tau": ["a", "b"]}},
+            "holds 'a' in row 0, counted from zero, which is no number",
+        ),
+        ({"record": {"t": [0.0, 1.0], "shaft.tau": np.array([1.0, "b"], dtype=object)}}, "holds 'b' in row 1"),
         ({"unknowns": 5}, "5 is no name"),
         ({"priors": [3.0]}, r"priors = \[3\.0\] must map unknowns"),
         ({"unknowns": {"J1.omega": ("x", 2.0)}}, "J1.omega"),
@@ -486,6 +491,39 @@ def test_what_is_wrong_is_said(change: dict[str, object], words: str) -> None:
     }
     with pytest.raises(sw.ParameterError, match=words):
         sw.fit(sw.scenes.crane_start(), **arguments)  # type: ignore[arg-type]
+
+
+def test_values_that_are_masked_are_missing_and_units_are_converted() -> None:
+    pint = pytest.importorskip("pint")
+    net, rng = smooth(np.random.default_rng(5)), np.random.default_rng(6)
+    plain = record(net, ["shaft.tau"], rng)
+    values = np.array(plain["shaft.tau"])
+    values[7] = 1e5
+    masked = np.ma.masked_array(values, np.arange(values.size) == 7)
+    missing = np.where(masked.mask, np.nan, values)
+    fits = [
+        sw.fit(net, {**plain, "shaft.tau": column}, ["shaft.c"]).values
+        for column in (missing, masked, pint.Quantity(missing / 1e3, "kN*m"))
+    ]
+    assert fits[0] == fits[1]
+    assert fits[2]["shaft.c"] == pytest.approx(fits[0]["shaft.c"], rel=1e-9)  # rounding of the conversion
+
+
+def test_what_a_record_does_not_tell_is_no_lack_of_values() -> None:
+    net, rng = smooth(np.random.default_rng(5)), np.random.default_rng(6)
+    net.add(sw.Brake("brake", tau=20.0, t_on=100.0), "wheel")  # long after the record
+    fit = sw.fit(net, record(net, ["shaft.tau"], rng), ["shaft.c", "brake.tau"])
+    assert "The record tells this combination not at all: brake.tau" in str(fit)
+    assert "as many unknowns as values" not in str(fit)
+
+
+def test_an_interval_holds_what_was_fitted_even_where_that_is_no_minimum() -> None:
+    net, rng = smooth(np.random.default_rng(5)), np.random.default_rng(6)
+    of_ms = record(net, ["shaft.tau"], rng)
+    with pytest.warns(sw.AccuracyWarning):  # a record over another motion than that of the network
+        fit = sw.fit(net, {**of_ms, "t": 10.0 * np.asarray(of_ms["t"])}, ["shaft.c", "shaft.d"])
+    for name, (low, high) in fit.intervals().items():
+        assert low <= fit.values[name] <= high
 
 
 def test_a_record_of_zeros_beside_another_one_is_fitted() -> None:

@@ -174,7 +174,7 @@ def test_what_runs_side_by_side_runs_one_by_one_where_it_must() -> None:
     damping[5], stiffness[6] = 1e9, 1e12  # are stiff
     made = sweep(swing(1.0), samples={"shaft.c": stiffness, "shaft.d": damping}, t_end=1.0, measures=["max shaft.tau"])
     assert made.why.startswith("3 of 16 variants ran one by one: 2 because it is stiff or swings very often")
-    assert made.why.endswith("; 1 because it has a zero where the first one has none, or ratios that meet")
+    assert made.why.endswith("; 1 because it has a zero where others have none, or ratios that meet")
     assert made.measures["max shaft.tau"][3] == pytest.approx(10.0, abs=1e-6)
     assert (np.delete(made.measures["max shaft.tau"], [3, 6]) < 9.9).all()
 
@@ -252,7 +252,7 @@ def test_a_variant_that_does_not_pass_says_which_limits_it_misses_or_why_it_fail
         require={"largest": (1.0, 8.0), "own": (None, 0.2)},
     )
     texts = made.columns["reason"].tolist()
-    assert texts[::2] == ["largest below 1", "", "largest above 8, own above 0.2"]
+    assert texts[::2] == ["largest below 1 N*m", "", "largest above 8 N*m, own above 0.2 rad/s"]
     assert all("t_off" in text for text in texts[1::2])
     assert list(made.reasons) == ["", texts[1], "", texts[3], "", texts[5]]  # of those that failed alone
     assert made.passed.tolist() == [not text for text in texts]

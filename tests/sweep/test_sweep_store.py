@@ -172,6 +172,14 @@ def test_a_store_is_that_of_what_a_partial_function_is_given(tmp_path: Path) -> 
             sw.studies.sweep(net, {"J.J": [1.0, 2.0]}, store=tmp_path / "store.sqlite", **call)
 
 
+def test_a_store_is_a_file_and_says_of_what_another_sweep_differs(whole: Path, tmp_path: Path) -> None:
+    with pytest.raises(sw.ParameterError, match="is no file, so nothing would be kept"):
+        swept(":memory:")  # type: ignore[arg-type]
+    path = copied(whole, tmp_path / "store.sqlite")
+    with pytest.raises(sw.ParameterError, match=r"differs in its t_end \(0\.1, and here 0\.2\)"):
+        swept(path, t_end=0.2)
+
+
 def test_variants_that_are_stored_twice_count_once(tmp_path: Path) -> None:
     pytest.importorskip("numba")
     net = sw.Network("swing")

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shaftwork.codegen.array_form.elements import Array
+from shaftwork.codegen.model_observer import ModelObserver
 from shaftwork.core.calls import BoundedCache
 from shaftwork.core.errors import AccuracyWarning, ParameterError
 from shaftwork.core.notices import warn
@@ -112,14 +113,14 @@ def fit(
         AccuracyWarning: what is left is no white noise, or more than `sigma`, so that the intervals do not hold.
     """
     starts, seed = start_count(starts), seed_number(seed)
-    domain, records = read_records(record)
+    model = _MODELS(network_of(net).netlist(), net.compile)
+    domain, records = read_records(record, ModelObserver(model.form, model.bind).units)
     initials, others, points = (
         _of_each(name, given, len(records))
         for name, given in (("initial", initial), ("parameters", parameters), ("at", at))
     )
     for states in initials:
         refuse_motion(states, "fit")
-    model = _MODELS(network_of(net).netlist(), net.compile)
     names, usual = _names(unknowns), initials[0] or {}
     model, begun = _begun(model, names, start or {})
     spans = unknowns if isinstance(unknowns, Mapping) else dict.fromkeys(names)

@@ -96,7 +96,7 @@ class Fit:
         Law: t-quantiles of the scaled unknowns, of a normal distribution where `sigma` was given. So the interval of a
         parameter that stays above zero does as well. That of a damping, a gap or another one that may be zero is even
         on both sides. Where a parameter ended at a bound, the interval is what there were without it. All are cut at
-        their bounds.
+        their bounds, and hold what was fitted, whatever derivatives tell of a better place.
 
         Args:
             level: the share of records whose interval holds the true value.
@@ -108,7 +108,9 @@ class Fit:
         reach = found.reach(inner_share("level", level))
         middle = np.where(self.scaling.to_zero | found.at_bounds, found.step, 0.0)
         low, high = (self.scaling.ends(found.unknowns, middle + sign * reach, found.bounds) for sign in (-1.0, 1.0))
-        return dict(zip(self.scaling.names, zip(low.tolist(), high.tolist(), strict=True), strict=True))
+        fitted = self.scaling.values(found.unknowns)
+        pairs = zip(np.minimum(low, fitted).tolist(), np.maximum(high, fitted).tolist(), strict=True)
+        return dict(zip(self.scaling.names, pairs, strict=True))
 
     @property
     def correlations(self) -> Array:
@@ -254,7 +256,7 @@ class Fit:
         notes += [self.caveat] if self.caveat else []
         if self.estimate.message:
             notes.append(f"This is no minimum yet: {self.estimate.message}.")
-        if not self.estimate.freedom.all():
+        if not self.estimate.freedom[np.isfinite(np.diag(self.estimate.covariance))].all():
             notes.append("There are as many unknowns as values to tell the noise by. Give more of them, or sigma.")
         if self.by_differences:
             notes.append("Derivatives by differences.")

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import reprlib
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from shaftwork.codegen.array_form.elements import Array
 from shaftwork.core.errors import ParameterError
-from shaftwork.core.parameters import LARGEST, is_quantity
+from shaftwork.core.parameters import LARGEST, is_quantity, numbers_in_si
 from shaftwork.results.observer import array_in_si
 
 
@@ -27,8 +28,12 @@ class RecordedSeries(NamedTuple):
     measured: Array
 
 
-def read_records(record: Any) -> tuple[str, list[dict[str, RecordedSeries]]]:
+def read_records(record: Any, units: Mapping[str, str]) -> tuple[str, list[dict[str, RecordedSeries]]]:
     """Whether over times "t" or frequencies "f", and what each of one or several records holds, by label.
+
+    Args:
+        record: one or several.
+        units: of quantities, SI.
 
     Raises:
         ParameterError: there is none, or one is none, says which; some are over times and some over frequencies.
@@ -36,7 +41,9 @@ def read_records(record: Any) -> tuple[str, list[dict[str, RecordedSeries]]]:
     listed = record if isinstance(record, list | tuple) else [record]
     if not listed:
         raise ParameterError("There is no record. Give {'t': times, 'shaft.tau': values}, or several in a list.")
-    domains, records = zip(*(_read(one, number, len(listed)) for number, one in enumerate(listed, 1)), strict=True)
+    domains, records = zip(
+        *(_read(one, units, number, len(listed)) for number, one in enumerate(listed, 1)), strict=True
+    )
     if len(set(domains)) > 1:
         raise ParameterError("Some records are over times and some over frequencies. Fit them one after the other.")
     if len(records) == 1:
@@ -46,21 +53,21 @@ def read_records(record: Any) -> tuple[str, list[dict[str, RecordedSeries]]]:
     ]
 
 
-def _read(record: Any, number: int, count: int) -> tuple[str, dict[str, RecordedSeries]]:
+def _read(record: Any, units: Mapping[str, str], number: int, count: int) -> tuple[str, dict[str, RecordedSeries]]:
     """Whether over times "t" or frequencies "f", and what is recorded there; an error says in which of several.
 
     Raises:
         ParameterError: as `_series` says.
     """
     try:
-        return _series(record)
+        return _series(record, units)
     except ParameterError as error:
         if count == 1:
             raise
         raise ParameterError(f"Record {number}: {error}") from None
 
 
-def _series(record: Any) -> tuple[str, dict[str, RecordedSeries]]:
+def _series(record: Any, units: Mapping[str, str]) -> tuple[str, dict[str, RecordedSeries]]:
     """Whether over times "t" or frequencies "f", and what is recorded there, in ascending order.
 
     Raises:
@@ -80,22 +87,29 @@ def _series(record: Any) -> tuple[str, dict[str, RecordedSeries]]:
             f"There are: {', '.join(columns) or 'none'}."
         )
     domain = domains[0]
-    at = array_in_si(domain, columns.pop(domain), {"t": "s", "f": "Hz"}[domain])
-    if not (at.size and np.isfinite(at).all() and at.min() >= 0.0):
+    places = columns.pop(domain)
+    if not len(places):
+        raise ParameterError(f"'{domain}' is empty: the record has no rows.")
+    at = array_in_si(domain, places, {"t": "s", "f": "Hz"}[domain])
+    if (missing := np.flatnonzero(~np.isfinite(at))).size:
+        raise ParameterError(f"'{domain}' has no finite value in row {missing[0]}, counted from zero. Leave it out.")
+    if not (at.size and at.min() >= 0.0):
         raise ParameterError(f"'{domain}' must be numbers from zero on. A motion starts at t = 0 s.")
     _refuse_huge(domain, at)
-    series = {name: _one_series(name, column, at, domain) for name, column in columns.items()}
+    series = {name: _one_series(name, column, at, domain, units.get(name)) for name, column in columns.items()}
     if domain == "t" and not any(one.at[-1] for one in series.values()):
         names = ", ".join(f"'{name}'" for name in series)
         raise ParameterError(f"{names}: all values are at t = 0 s, where a motion only starts. Give later ones.")
     return domain, series
 
 
-def _one_series(name: str, column: Any, at: Array, domain: str) -> RecordedSeries:
+def _one_series(name: str, column: Any, at: Array, domain: str, unit: str | None) -> RecordedSeries:
     """A column in ascending order, without what is missing."""
     if is_quantity(column):
-        raise ParameterError(f"'{name}' has a unit. Give plain numbers in SI.")
-    values = np.asarray(column)
+        if unit is None:
+            raise ParameterError(f"'{name}' has a unit, and what it is in SI is not known. Give plain numbers.")
+        column = numbers_in_si(name, column, unit)
+    values = np.asarray(np.ma.filled(column.astype(object), np.nan) if np.ma.is_masked(column) else column)
     if domain == "t" and np.iscomplexobj(values):
         raise ParameterError(f"'{name}' is complex: a frequency response has a column 'f' in place of 't'.")
     if values.shape != at.shape:
@@ -104,8 +118,13 @@ def _one_series(name: str, column: Any, at: Array, domain: str) -> RecordedSerie
     try:
         ordered = values[order].astype(float if domain == "t" else complex)
     except (TypeError, ValueError):
-        wrong = next((one for one in values.ravel().tolist() if not isinstance(one, complex | float | int)), "")
-        raise ParameterError(f"'{name}' holds something else than numbers, {wrong!r} first. Drop the column.") from None
+        row, wrong = next(
+            (k, one) for k, one in enumerate(values.tolist()) if not isinstance(one, complex | float | int)
+        )
+        raise ParameterError(
+            f"'{name}' holds {wrong!r} in row {row}, counted from zero, which is no number. Read the file with "
+            "na_values=[...] or decimal=',' of pandas, or drop the column."
+        ) from None
     there = np.isfinite(ordered)
     if not there.any():
         raise ParameterError(f"'{name}' has no finite value.")

@@ -130,8 +130,8 @@ class Optimum:
 
     def _limits(self, name: str) -> str:
         low, high = self.require[name]
-        words = [f"at least {low:g}"] if low is not None else []
-        return " and ".join([*words, *([f"at most {high:g}"] if high is not None else [])])
+        sides = [f"at {word} {end:g}" for word, end in (("least", low), ("most", high)) if end is not None]
+        return " and ".join(sides)
 
     def __str__(self) -> str:
         title, header, rows = self._rows()

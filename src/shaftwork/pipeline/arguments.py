@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from difflib import get_close_matches
 from typing import Any, Literal, TypeVar
 
 import numpy as np
@@ -289,8 +290,10 @@ def checked_parameter(netlist: Netlist, name: str, value: Any, where: str = "") 
     part = next((placed.part for placed in netlist.placed if placed.part.name == owner), None)
     if part is None or parameter not in part.declared:
         parts = [placed.part for placed in netlist.placed] if part is None else [part]
-        names = ", ".join(f"{other.name}.{key}" for other in parts for key in _numbers(other))
-        raise ParameterError(f"There is no parameter '{name}'. There are: {names or 'none'}.")
+        names = [f"{other.name}.{key}" for other in parts for key in _numbers(other)]
+        close = get_close_matches(name, names, n=3) if part is None else []
+        there = f"Close to it: {', '.join(close)}." if close else f"There are: {', '.join(names) or 'none'}."
+        raise ParameterError(f"There is no parameter '{name}'. {there}")
     number, objection = part.declared[parameter].magnitude(value)
     if objection is None and not isinstance(number, float):
         objection = "must be a number here: a law is part of the network, so build another network with it"

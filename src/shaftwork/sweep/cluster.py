@@ -118,13 +118,15 @@ class _Calls:
         Raises:
             SimulationError: there will be none.
         """
-        text = "The cluster has had no workers for {} minutes. Their logs tell why."
+        text = "The cluster has had no workers for {:.0f} s. Their logs tell why."
         local = self._client.cluster is None or isinstance(self._client.cluster, self._distributed.LocalCluster)
         if idle > 300.0 and local:  # others may be waiting in a queue
-            raise SimulationError(f"{text.format(5)} What a store has is kept, and the same call goes on from there.")
+            raise SimulationError(
+                f"{text.format(idle)} What a store has is kept, and the same call goes on from there."
+            )
         if idle > 60.0 and not self._told:
             self._told = True
-            warn(f"{text.format('some')} The sweep waits for them.", UserWarning)
+            warn(f"{text.format(idle)} The sweep waits for them.", UserWarning)
 
     def next(self) -> list[Chunk]:
         """Chunks of a call that is done; none where none is within a second."""

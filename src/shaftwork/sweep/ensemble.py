@@ -39,7 +39,7 @@ from shaftwork.sweep.lane_tables import LaneCourse, LaneEnd, Met
 STIFF = "it is stiff or swings very often, or its peaks are too many to be told apart"
 NO_END = "a law drives it back to its jump, or its modes change without end"
 OTHER_START = "it starts at or beyond a rigid limit, or in other modes than the first one"
-ZERO = "it has a zero where the first one has none, or ratios that meet"
+ZERO = "it has a zero where others have none, or ratios that meet"
 NO_MODES = "what follows an instant is told by its own run"
 INFINITE = "a measure of it is no finite number"
 MOST_STRETCHES, MOST_SWITCHES = 2000, 200

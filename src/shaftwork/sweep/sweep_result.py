@@ -42,6 +42,8 @@ def limits_of(require: Mapping[str, Any], unit_of: Callable[[str], str | None]) 
     Raises:
         ParameterError: one is no pair of numbers, has the wrong units, or nothing lies between its sides.
     """
+    if not isinstance(require, Mapping):
+        raise ParameterError(f"require = {require!r} must map measures to limits, {{'max shaft.tau': (None, 350.0)}}.")
     limits: dict[str, Limits] = {}
     for name, given in require.items():
         sides = given if isinstance(given, tuple | list) else [given]
@@ -113,10 +115,11 @@ class Sweep:
     def _missed(self) -> Iterator[tuple[str, NDArray[np.bool_]]]:
         """Each limit in words, and (k,) which variants miss it."""
         for name, (low, high) in self.require.items():
+            unit = f" {self.units[name]}" if self.units.get(name, "1") != "1" else ""
             if low is not None:
-                yield f"{name} below {low:g}", ~(self.measures[name] >= low)
+                yield f"{name} below {low:g}{unit}", ~(self.measures[name] >= low)
             if high is not None:
-                yield f"{name} above {high:g}", ~(self.measures[name] <= high)
+                yield f"{name} above {high:g}{unit}", ~(self.measures[name] <= high)
 
     @property
     def _verdicts(self) -> NDArray[np.object_]:

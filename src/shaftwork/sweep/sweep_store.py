@@ -51,6 +51,8 @@ class Store:
         if not isinstance(path, str | Path):
             raise ParameterError(f"store = {path!r} must be the name of a file.")
         self._path = Path(path)
+        if str(path) == ":memory:":  # SQLite's name for what is gone with the process
+            raise ParameterError("store = ':memory:' is no file, so nothing would be kept. Give the name of one.")
         if self._path.exists() and not self._path.is_file():
             raise ParameterError(f"store = '{path}' cannot be used: it is no file. Give another name.")
         with self._told():
@@ -95,9 +97,11 @@ class Store:
     def _refuse_other(self, there: Mapping[str, str], title: Mapping[str, str]) -> None:
         differing = [what for what, value in title.items() if there.get(what) != value]
         if others := [what for what in differing if what != LIBRARIES]:
+            short = {"t_end", "measures", "options"}  # the others are digests
+            words = f" ({there.get(others[0])}, and here {title[others[0]]})" if others[0] in short else ""
             raise ParameterError(
-                f"store = '{self._path}' holds another sweep, which differs in its {others[0]}, so its results are "
-                "not those of this one. Give another name, or repeat the call that made it."
+                f"store = '{self._path}' holds another sweep, which differs in its {others[0]}{words}, so its results "
+                "are not those of this one. Give another name, or repeat the call that made it."
             )
         if differing:
             before, now = (json.loads(text) for text in (there[LIBRARIES], title[LIBRARIES]))

@@ -12,6 +12,7 @@ from scipy import stats
 
 from shaftwork.core.errors import ParameterError, imported
 from shaftwork.core.parameters import in_si, whole
+from shaftwork.core.screen import counted
 from shaftwork.pipeline.arguments import checked_parameter, seed_number
 from shaftwork.pipeline.columns import Checked, column_in_si, has_many
 from shaftwork.pipeline.network import Network, network_of
@@ -79,11 +80,42 @@ def _of_scipy(name: str, given: Any) -> Any:
         raise ParameterError(f"'{name}': {given.name} has no parameters yet. Give them, such as norm(24e3, 500).")
     with np.errstate(invalid="ignore"):  # of a scale without end
         middle = _quantiles(given, np.array([0.5]))
+    if middle.shape != (1,):
+        raise ParameterError(f"'{name}': {_told(given)} are {middle.size} distributions. Give one.")
     if not np.isfinite(middle).all():
-        words = getattr(given, "args", ()), getattr(given, "kwds", {})
-        told = f"{given.dist.name}{words}" if hasattr(given, "dist") else repr(given)
-        raise ParameterError(f"'{name}': {told} has no values. Deviations and scales are finite and larger than zero.")
+        raise ParameterError(
+            f"'{name}': {_told(given)} has no values. Deviations and scales are finite and larger than zero."
+        )
     return given
+
+
+def _told(distribution: Distribution) -> str:
+    """A distribution in words."""
+    if isinstance(distribution, tuple):
+        return f"{distribution[0]:.6g} to {distribution[1]:.6g}"
+    if isinstance(distribution, np.ndarray):
+        return counted(distribution.size, "value")
+    if hasattr(distribution, "dist"):
+        named = (f"{name}={value}" for name, value in distribution.kwds.items())
+        return f"{distribution.dist.name}({', '.join([*map(str, distribution.args), *named])})"
+    return str(distribution)
+
+
+def refuse_samples(net: Network, design: Design) -> None:
+    """Refuse a distribution of which a sample is no value of its parameter.
+
+    Raises:
+        ParameterError: there is one; says which value.
+    """
+    netlist = network_of(net).netlist()
+    for name, column in design.columns.items():
+        try:
+            column_in_si(name, column, partial(checked_parameter, netlist, name), rows=True)
+        except ParameterError as error:
+            raise ParameterError(
+                f"{error} It was drawn from {design.told[name]}. Give a distribution without such values, as lognorm "
+                "or truncnorm."
+            ) from None
 
 
 def _quantiles(distribution: Any, shares: Array) -> Array:
@@ -150,6 +182,8 @@ class Design:
         }
         """(rows,) values by parameter."""
         self.shares = shares
+        self.told = {name: _told(distribution) for name, distribution in distributions.items()}
+        """By parameter, the distribution in words."""
 
     @property
     def problem(self) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from shaftwork.pipeline.network import Network
 from shaftwork.results.observer import Array
 from shaftwork.sweep.sweep import Measures, sweep
 from shaftwork.sweep.sweep_result import Sweep
-from shaftwork.uncertainty.draws import Design, Distribution, distributions_in_si
+from shaftwork.uncertainty.draws import Design, Distribution, distributions_in_si, refuse_samples
 from shaftwork.uncertainty.uncertainty_result import Uncertainty
 
 Columns = Mapping[str, Array]
@@ -62,6 +62,7 @@ def uncertainty(
     if isinstance(net, Network):
         if measures is None:
             raise ParameterError("Name what is measured, measures=['max shaft.tau'].")
+        refuse_samples(net, design)
         return Uncertainty(sweep(net, samples=design.columns, measures=measures, **options), design, level)
     if not callable(net):
         raise ParameterError(f"{net!r} is neither a network nor a function of columns of samples.")

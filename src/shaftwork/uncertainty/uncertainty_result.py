@@ -13,7 +13,7 @@ from shaftwork.core.errors import AccuracyWarning, ParameterError, SimulationErr
 from shaftwork.core.notebook import html_table
 from shaftwork.core.notices import warn
 from shaftwork.core.parameters import in_si
-from shaftwork.core.screen import counted, in_columns
+from shaftwork.core.screen import counted, in_columns, named
 from shaftwork.pipeline.arguments import inner_share
 from shaftwork.pipeline.measured_units import limits_in_si
 from shaftwork.results.observer import Array
@@ -115,7 +115,7 @@ class Uncertainty:
         Args:
             measure: its name.
             above: upper limit, in the SI unit of the measure or with units.
-            below: lower limit.
+            below: lower limit; with both, that it passes either.
 
         Raises:
             ParameterError: there is no such measure or no limit, or a limit is no finite number or has the wrong
@@ -127,11 +127,15 @@ class Uncertainty:
         if above is None and below is None:
             raise ParameterError("Give a limit, above=... or below=....")
         values, unit = self._drawn(measure), self.sweep.units.get(measure)
+        given = {name: limit for name, limit in (("above", above), ("below", below)) if limit is not None}
+        limits = {name: in_si(name, limits_in_si(name, limit, unit)) for name, limit in given.items()}
+        high, low = limits.get("above", np.inf), limits.get("below", -np.inf)
+        if high < low:
+            raise ParameterError(
+                f"Every value is above {high:g} or below {low:g}. Give above > below: what is between them is left out."
+            )
         known = np.isfinite(values)
-        passing = np.zeros(values.size, dtype=bool)
-        for name, limit, passed in (("above", above, np.greater), ("below", below, np.less)):
-            if limit is not None:
-                passing |= known & passed(values, in_si(name, limits_in_si(name, limit, unit)))
+        passing = known & ((values > high) | (values < low))
         least, failed = int(passing.sum()), int((~known).sum())
         if failed:
             warn(
@@ -140,9 +144,9 @@ class Uncertainty:
                 "sweep.reasons.",
                 AccuracyWarning,
             )
-        low, high = (stats.binomtest(k, values.size).proportion_ci(self.level) for k in (least, least + failed))
+        fewest, most = (stats.binomtest(k, values.size).proportion_ci(self.level) for k in (least, least + failed))
         share = least / (values.size - failed) if known.any() else np.nan
-        return Probability(share, float(low.low), float(high.high))
+        return Probability(share, float(fewest.low), float(most.high))
 
     def indices(self, measure: str) -> dict[str, dict[str, tuple[float, float]]]:
         """Where the uncertainty of a measure comes from: by index and parameter, the value and half its interval.
@@ -195,7 +199,9 @@ class Uncertainty:
         for measure in self.measures:
             indices = self.indices(measure)
             leading = indices["ST"] if "ST" in indices else indices["mu*"]
-            rows.append([measure, *(text for index in indices for text in (index, f"+- ({100 * self.level:g} %)"))])
+            spread = f"+- ({100 * self.level:g} %)"
+            headings = [(index, "" if index == "sigma" else spread) for index in indices]  # sigma has no interval
+            rows.append([measure, *chain.from_iterable(headings)])
             for name in sorted(leading, key=lambda name: -leading[name][0]):
                 cells = (value for by in indices.values() for value in by[name])
                 rows.append([name, *("" if np.isnan(value) else f"{value:z.3g}" for value in cells)])
@@ -207,6 +213,10 @@ class Uncertainty:
         first = next((f", the first: {reason}" for reason in self.sweep.reasons if reason), "")
         return f"{self.sweep.name}: {counted(len(self), 'sample')}, {failed} failed{first}"
 
+    @property
+    def _drawn_from(self) -> list[str]:
+        return named("drawn from", [f"{name} {told}" for name, told in self.design.told.items()])
+
     def __str__(self) -> str:
         tables = [
             in_columns(rows, range(first, len(rows[0])))
@@ -214,10 +224,13 @@ class Uncertainty:
             if rows
         ]
         note = [self._unranked] if self._unranked else []
-        return "\n".join([self._title, *chain.from_iterable(tables), *note])
+        return "\n".join([self._title, *chain.from_iterable(tables), *self._drawn_from, *note])
 
     def _repr_html_(self) -> str:
-        note, tables = self._unranked, [rows for rows in (self._rows(), self._shares()) if rows] or [[[]]]
+        note, tables = (
+            " ".join([*self._drawn_from, self._unranked]),
+            [rows for rows in (self._rows(), self._shares()) if rows] or [[[]]],
+        )
         return "".join(html_table(self._title, rows[0], rows[1:], note) for rows in tables)
 
     def plot(self) -> Figure:
