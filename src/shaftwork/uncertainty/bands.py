@@ -22,7 +22,7 @@ from shaftwork.results.plotting import label, new_figure
 from shaftwork.results.solution import Solution
 from shaftwork.sweep.sweep import sweep
 from shaftwork.sweep.sweep_result import Sweep
-from shaftwork.uncertainty.draws import Design, Distribution, distributions_in_si
+from shaftwork.uncertainty.draws import Design, Distribution, distributions_in_si, refuse_samples
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -146,7 +146,7 @@ def bands(
     if taken := [name for name in ("t_end", "t_eval", "measures") if name in options]:
         raise ParameterError(f"bands has no {taken[0]}: it shows the quantity at the times t. Leave it out.")
     level = inner_share("level", level)
-    columns = _columns(distributions_in_si(net, distributions), samples, seed_number(seed))
+    columns = _columns(net, distributions_in_si(net, distributions), samples, seed_number(seed))
     if len(next(iter(columns.values()))) < 2:
         raise ParameterError("A band needs two samples or more.")
     course = _Course()
@@ -202,9 +202,13 @@ def _good(found: Sweep) -> Sweep:
     return found.rows(~found.failed)
 
 
-def _columns(distributions: Mapping[str, Distribution], samples: int | None, seed: int) -> Mapping[str, Array]:
+def _columns(
+    net: Network, distributions: Mapping[str, Distribution], samples: int | None, seed: int
+) -> Mapping[str, Array]:
     """Samples by parameter; of one list alone each value once."""
     ((name, values), *others) = distributions.items()
     if samples is None and not others and isinstance(values, np.ndarray):
         return {name: values}
-    return Design(distributions, "random", 100 if samples is None else samples, seed).columns
+    design = Design(distributions, "random", 100 if samples is None else samples, seed)
+    refuse_samples(net, design)
+    return design.columns
