@@ -314,6 +314,7 @@ def test_nothing_is_asked_outside_the_ranges() -> None:
         ({"goal": "JL.omega"}, "is no measure"),
         ({"goal": 5}, "goal = 5 must be a measure, or a function of all parameters"),
         ({"functions": {"price": "max JL.omega"}, "require": {"price": (0, 1)}}, r"functions\['price'\] = 'max"),
+        ({"require": len}, "require = <built-in function len> must map measures to limits"),
         ({"choices": {"a": 5}}, r"choices\['a'\] must be a list of sets"),
         ({"goal": "damage JL.omega"}, "no derivative"),
         ({"starts": 0}, "starts = 0"),

@@ -29,7 +29,7 @@ from shaftwork.pipeline.measured_units import parameter_units, units_of
 from shaftwork.pipeline.motion_start import refuse_motion
 from shaftwork.pipeline.network import Network, network_of, with_values
 from shaftwork.results.measures import Measure
-from shaftwork.sweep.sweep_result import Limits, limits_of
+from shaftwork.sweep.sweep_result import Limits, limits_of, requirements
 
 OBJECTIVE = "objective"
 """The name under which a function stands that is made least."""
@@ -81,9 +81,10 @@ def optimize(
     ranges = _ranges(net, variables)
     starts, seed = start_count(starts), seed_number(seed)
     refuse_motion(initial, "optimize")
-    name, goals = _goals(goal, functions or {}, require or {})
+    required = requirements(require)
+    name, goals = _goals(goal, functions or {}, required)
     units = units_of(net, {other: Measure.read(text) for other, text in goals.items() if isinstance(text, str)})
-    limits = limits_of(require or {}, units.get)
+    limits = limits_of(required, units.get)
     _, end = time_span(0.0, t_end)
     taken = _combinations(choices, ranges)
     attempts: list[Attempt] = []

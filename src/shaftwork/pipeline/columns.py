@@ -32,7 +32,8 @@ def column_in_si(name: str, values: Any, checked: Checked, *, rows: bool = False
         ParameterError: they are no sequence, or one of them is not admissible.
     """
     if not has_many(values):
-        raise ParameterError(f"'{name}': {values!r} must be a sequence of values. Write [{values!r}].")
+        advice = "one for each row" if rows else f"such as [{values!r}]"
+        raise ParameterError(f"'{name}': {values!r} must be a sequence of values, {advice}.")
     values = values.to_numpy() if hasattr(values, "to_numpy") else values
     if np.ma.is_masked(values):
         raise ParameterError(f"'{name}' has values that are masked. Leave their rows out.")

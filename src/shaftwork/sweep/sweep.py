@@ -38,7 +38,7 @@ from shaftwork.results.fatigue import SNLine
 from shaftwork.results.measures import Measure
 from shaftwork.results.observer import Array
 from shaftwork.results.solution import Solution
-from shaftwork.sweep.sweep_result import VERDICTS, Limits, Sweep, limits_of
+from shaftwork.sweep.sweep_result import VERDICTS, Limits, Sweep, limits_of, requirements
 from shaftwork.sweep.sweep_store import Store
 from shaftwork.sweep.sweep_task import SIDE_BY_SIDE, Chunk, Index, Reader, Task, Worker, chunks
 
@@ -288,9 +288,10 @@ def _readers(measures: Measures, columns: Iterable[str]) -> dict[str, Reader]:
 def _limits(
     require: Mapping[str, Any] | None, readers: Mapping[str, Reader], units: Mapping[str, str]
 ) -> dict[str, Limits]:
-    if others := [name for name in require or {} if name not in readers]:
+    required = requirements(require)
+    if others := [name for name in required if name not in readers]:
         raise ParameterError(f"require: there is no measure '{others[0]}'. There are: {', '.join(readers)}.")
-    return limits_of(require or {}, units.get)
+    return limits_of(required, units.get)
 
 
 def _lines(sn: Any, readers: Mapping[str, Reader]) -> dict[str, SNLine]:

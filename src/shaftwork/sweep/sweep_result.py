@@ -32,6 +32,17 @@ Limits = tuple[float | None, float | None]
 """The least and the most that is allowed; None leaves a side open."""
 
 
+def requirements(require: Any) -> Mapping[str, Any]:
+    """What a user requires; nothing of None.
+
+    Raises:
+        ParameterError: it is no mapping.
+    """
+    if not isinstance(require, Mapping | None):
+        raise ParameterError(f"require = {require!r} must map measures to limits, {{'max shaft.tau': (None, 350.0)}}.")
+    return require or {}
+
+
 def limits_of(require: Mapping[str, Any], unit_of: Callable[[str], str | None]) -> dict[str, Limits]:
     """Limits that a user gave, by name, in SI.
 
@@ -42,8 +53,6 @@ def limits_of(require: Mapping[str, Any], unit_of: Callable[[str], str | None]) 
     Raises:
         ParameterError: one is no pair of numbers, has the wrong units, or nothing lies between its sides.
     """
-    if not isinstance(require, Mapping):
-        raise ParameterError(f"require = {require!r} must map measures to limits, {{'max shaft.tau': (None, 350.0)}}.")
     limits: dict[str, Limits] = {}
     for name, given in require.items():
         sides = given if isinstance(given, tuple | list) else [given]
