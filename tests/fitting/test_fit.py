@@ -432,6 +432,12 @@ def test_a_controller_that_samples_is_fitted_by_differences() -> None:
         ({"record": {"t": [0.0, 1.0], "shaft.tau": [1.0]}}, "as many"),
         ({"record": {"t": [-1.0, 1.0], "shaft.tau": [1.0, 2.0]}}, "from zero on"),
         ({"record": {"t": [0.0, 1.0], "shaft.tau": [np.nan, np.nan]}}, "no finite value"),
+        ({"record": {"t": [0.0, 1.0, 2.0], "shaft.tau": ["3.5", "4.5", "n/a"]}}, "holds 'n/a' in row 2"),
+        ({"record": {"t": 3.0, "shaft.tau": [1.0, 2.0]}}, "as many"),
+        (
+            {"record": {"t": np.ma.masked_array([0.0, 1.0], [0, 1]), "shaft.tau": [1.0, 2.0]}},
+            "'t' has no finite value in row 1",
+        ),
         ({"record": {"t": [], "shaft.tau": []}}, "'t' is empty"),
         ({"record": {"t": [0.0, np.nan], "shaft.tau": [0.0, 1.0]}}, "'t' has no finite value in row 1"),
         ({"record": {"t": [0.0], "shaft.tau": [0.0]}}, r"'shaft\.tau': all values are at t = 0 s"),

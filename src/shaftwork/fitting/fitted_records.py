@@ -87,8 +87,8 @@ def _series(record: Any, units: Mapping[str, str]) -> tuple[str, dict[str, Recor
             f"There are: {', '.join(columns) or 'none'}."
         )
     domain = domains[0]
-    places = columns.pop(domain)
-    if not len(places):
+    places = _unmasked(columns.pop(domain))
+    if not np.size(places):
         raise ParameterError(f"'{domain}' is empty: the record has no rows.")
     at = array_in_si(domain, places, {"t": "s", "f": "Hz"}[domain])
     if (missing := np.flatnonzero(~np.isfinite(at))).size:
@@ -109,7 +109,7 @@ def _one_series(name: str, column: Any, at: Array, domain: str, unit: str | None
         if unit is None:
             raise ParameterError(f"'{name}' has a unit, and what it is in SI is not known. Give plain numbers.")
         column = numbers_in_si(name, column, unit)
-    values = np.asarray(np.ma.filled(column.astype(object), np.nan) if np.ma.is_masked(column) else column)
+    values = np.asarray(_unmasked(column))
     if domain == "t" and np.iscomplexobj(values):
         raise ParameterError(f"'{name}' is complex: a frequency response has a column 'f' in place of 't'.")
     if values.shape != at.shape:
@@ -118,9 +118,8 @@ def _one_series(name: str, column: Any, at: Array, domain: str, unit: str | None
     try:
         ordered = values[order].astype(float if domain == "t" else complex)
     except (TypeError, ValueError):
-        row, wrong = next(
-            (k, one) for k, one in enumerate(values.tolist()) if not isinstance(one, complex | float | int)
-        )
+        listed = values.tolist()
+        row, wrong = next(((k, one) for k, one in enumerate(listed) if not _is_number(one)), (0, listed[0]))
         raise ParameterError(
             f"'{name}' holds {wrong!r} in row {row}, counted from zero, which is no number. Read the file with "
             "na_values=[...] or decimal=',' of pandas, or drop the column."
@@ -131,6 +130,19 @@ def _one_series(name: str, column: Any, at: Array, domain: str, unit: str | None
     _refuse_huge(name, ordered[there])
     parts = [ordered] if domain == "t" else [ordered.real, ordered.imag]
     return RecordedSeries(name, at[order][there], np.concatenate([part[there] for part in parts]))
+
+
+def _unmasked(column: Any) -> Any:
+    """A column without a mask: what is under one is no value."""
+    return np.ma.filled(column.astype(object), np.nan) if np.ma.is_masked(column) else column
+
+
+def _is_number(value: Any) -> bool:
+    try:
+        complex(value)
+    except (TypeError, ValueError):
+        return False
+    return True
 
 
 def _refuse_huge(name: str, values: Array) -> None:
