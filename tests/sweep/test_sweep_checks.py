@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -211,6 +212,9 @@ def test_a_measure_that_other_processes_do_not_find_is_refused_where_they_are_as
     call: dict[str, Any] = {"t_end": 0.1, "measures": {"speed": lambda solution: float(solution["J.omega"][-1])}}
     net = train(sw.Damper("oil", d=1.0))
     assert not sw.studies.sweep(net, {"J.J": [1.0, 2.0]}, **call).failed.any()
+    inside = {**call, "measures": {"speed": partial(call["measures"]["speed"])}}
+    with pytest.raises(sw.ParameterError, match=r"do not find the measure 'speed'"):
+        sw.studies.sweep(net, {"J.J": [1.0, 2.0]}, processes=2, **inside)
     with pytest.raises(
         sw.ParameterError, match=r"processes = 2: other processes do not find the measure 'speed'.* lambda"
     ):

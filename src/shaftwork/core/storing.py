@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import fields
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +21,10 @@ def is_found_elsewhere(thing: Any) -> bool:
 
     It does not find what is inside a function, in a notebook, or in a script that is no file.
     """
+    while isinstance(thing, partial):
+        thing = thing.func
     named = thing if hasattr(thing, "__qualname__") else type(thing)
-    is_here = named.__module__ == "__main__"
+    is_here = getattr(named, "__module__", "") == "__main__"
     return "<" not in named.__qualname__ and not (
         is_here and not Path(getattr(sys.modules["__main__"], "__file__", "")).is_file()
     )

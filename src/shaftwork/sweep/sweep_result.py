@@ -206,7 +206,7 @@ class Sweep:
     def plot(self, *names: str) -> Figure:
         """Parallel coordinates: a line for each variant, through its parameters and measures (extra `plot`).
 
-        Of more than 2000 variants, as many lines as can be told apart, those that are spread evenly over all are shown.
+        Of more than 2000 variants some that are spread evenly over all are shown: more lines would hide each other.
 
         Args:
             *names: of the columns; by default all.

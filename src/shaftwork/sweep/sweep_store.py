@@ -19,6 +19,7 @@ import numpy as np
 
 from shaftwork.core.errors import AccuracyWarning, ParameterError
 from shaftwork.core.notices import warn
+from shaftwork.core.screen import shorter
 from shaftwork.pipeline.network import Network
 from shaftwork.results.measures import Measure
 from shaftwork.sweep.cluster import libraries
@@ -98,7 +99,8 @@ class Store:
         differing = [what for what, value in title.items() if there.get(what) != value]
         if others := [what for what in differing if what != LIBRARIES]:
             short = {"t_end", "measures", "options"}  # the others are digests
-            words = f" ({there.get(others[0])}, and here {title[others[0]]})" if others[0] in short else ""
+            both = (shorter(str(one.get(others[0]))) for one in (there, title))
+            words = " ({}, and here {})".format(*both) if others[0] in short else ""
             raise ParameterError(
                 f"store = '{self._path}' holds another sweep, which differs in its {others[0]}{words}, so its results "
                 "are not those of this one. Give another name, or repeat the call that made it."
